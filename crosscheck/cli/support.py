@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from crosscheck.conformance.mechanisms.closed_forms import armature_pendulum, gear_pair, rack, screw
 from crosscheck.conformance.mechanisms.features import feature_scenes, massless_link, undetermined
-from crosscheck.conformance.mechanisms.geared_forms import armature_pendulum, gear_pair, rack, screw
 from crosscheck.engine import BUILT_IN, LARGE, OPTIONAL, Cannot, engine
 from mbref.scene import Scene
 from mbref.scenes import SCENES

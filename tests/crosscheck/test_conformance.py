@@ -14,8 +14,8 @@ from rich.console import Console
 from crosscheck.cli.commands import main
 from crosscheck.conformance import suite, trial
 from crosscheck.conformance.changes.relations import shaken
+from crosscheck.conformance.mechanisms.closed_forms import GEARED
 from crosscheck.conformance.mechanisms.features import undetermined
-from crosscheck.conformance.mechanisms.geared_forms import GEARED
 from crosscheck.conformance.mechanisms.specimens import specimens
 from crosscheck.conformance.runners import InProcess, Isolated
 from crosscheck.engine import engine

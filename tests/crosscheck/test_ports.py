@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES
+from crosscheck.conformance.mechanisms.closed_forms import screw
 from crosscheck.conformance.mechanisms.features import feature_scenes
-from crosscheck.conformance.mechanisms.geared_forms import screw
 from crosscheck.engine import Owner, Setting, engine
 from crosscheck.engines.mujoco.ports import FAMILIES
 from crosscheck.findings.finding import FOLDER

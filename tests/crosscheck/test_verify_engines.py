@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from crosscheck.conformance import suite, trial
-from crosscheck.conformance.mechanisms.geared_forms import GEARED
+from crosscheck.conformance.mechanisms.closed_forms import GEARED
 from crosscheck.conformance.mechanisms.specimens import RELATED, specimens
 from crosscheck.conformance.runners import InProcess
 from crosscheck.engine import BUILT_IN, engine

@@ -8,10 +8,9 @@ from functools import partial
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES
 from crosscheck.conformance.mechanisms import random_scenes
 from crosscheck.conformance.mechanisms.awkward import AWKWARD, awkward
-from crosscheck.conformance.mechanisms.closed_forms import CLOSED_FORMS
+from crosscheck.conformance.mechanisms.closed_forms import CLOSED_FORMS, GEARED
 from crosscheck.conformance.mechanisms.features import feature_scenes, massless_link, undetermined
 from crosscheck.conformance.mechanisms.geared import geared_mechanism
-from crosscheck.conformance.mechanisms.geared_forms import GEARED
 from crosscheck.conformance.mechanisms.hard import HARD
 from crosscheck.conformance.mechanisms.moving import dead_end, moving_probes
 from crosscheck.conformance.mechanisms.planar import planar_loops

@@ -2,7 +2,7 @@
 
 - ``features`` has a small scene for each feature of the scene format.
 - ``moving`` has bodies and loops in motion, ``planar`` loops in one plane.
-- ``closed_forms`` and ``geared_forms`` have scenes whose exact motions are formulas.
+- ``closed_forms`` has scenes whose exact motions are formulas.
 - ``random_mechanisms`` makes closed loops from seeds, ``geared`` adds armatures and a coupling.
 - ``large_graphs`` makes mechanisms of 10 to 200 bodies from seeds.
 - ``large_graphs`` makes mechanisms of many bodies.

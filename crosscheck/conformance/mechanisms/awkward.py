@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 
@@ -54,6 +55,14 @@ from mbref.scene import (
 )
 
 
+def rods(steps: np.ndarray, rng: Rng, thickness: float = 0.05) -> tuple[list[str], np.ndarray, list[Body]]:
+    """Return names, the ground's first, points (n + 1, 3) and rods b0, b1, … of a chain from the origin."""
+    points = np.cumsum(np.vstack([np.zeros(3), steps]), axis=0)
+    names = [f"b{k}" for k in range(len(steps))]
+    bodies = [rod(n, p, q, rng, thickness) for n, p, q in zip(names, points[:-1], points[1:], strict=True)]
+    return ["ground", *names], points, bodies
+
+
 # --- tops ------------------------------------------------------------------------------------------------
 def fast_top(rng: Rng) -> Scene:
     """Return an unsymmetric top on a ball joint at 100 to 300 rad/s, with a principal axis inclined to the
@@ -95,15 +104,13 @@ def gimbal(rng: Rng) -> Scene:
 def tumbling_chain(rng: Rng) -> Scene:
     """Return three bodies on ball and universal joints with large velocities: eight or nine degrees of
     freedom, chaotic within seconds."""
-    points = np.cumsum(np.vstack([np.zeros(3), 0.4 * np.array([direction(rng) for _ in range(3)])]), axis=0)
+    steps = 0.4 * np.array([direction(rng) for _ in range(3)])
     kinds, axes = ("spherical", "universal", "spherical"), [direction(rng) for _ in range(3)]
-    names = ("ground", "b0", "b1", "b2")
-    bodies = [rod(n, p, q, rng) for n, p, q in zip(names[1:], points[:-1], points[1:], strict=True)]
+    names, points, bodies = rods(steps, rng)
     spin = triple(5 * rng.normal(size=3))
     bodies[0] = bodies[0].model_copy(update={"angular_velocity": spin})
     joints = [
-        joint(f"J{k}", kind, (names[k], names[k + 1]), triple(points[k]), axes[k])
-        for k, kind in enumerate(kinds)
+        joint(f"J{k}", kinds[k], pair, triple(points[k]), axes[k]) for k, pair in enumerate(pairwise(names))
     ]
     return Scene(name="tumbling_chain", gravity=DOWN, duration=1.0, body=tuple(bodies), joint=tuple(joints))
 
@@ -140,14 +147,12 @@ def stiff_dampers(rng: Rng) -> Scene:
 def stiff_chain(rng: Rng) -> Scene:
     """Return a tree of three degrees of freedom with torsion springs, one of which is damped 1e3 to 1e5 times
     beyond critical."""
-    points = np.cumsum(np.vstack([np.zeros(3), 0.3 * np.array([direction(rng) for _ in range(3)])]), axis=0)
-    names, axes = ("ground", "b0", "b1", "b2"), [direction(rng) for _ in range(3)]
-    bodies = [rod(n, p, q, rng) for n, p, q in zip(names[1:], points[:-1], points[1:], strict=True)]
+    steps = 0.3 * np.array([direction(rng) for _ in range(3)])
+    axes = [direction(rng) for _ in range(3)]
+    names, points, bodies = rods(steps, rng)
     joints = [
-        Revolute(
-            name=f"R{k}", bodies=(names[k], names[k + 1]), anchor=triple(points[k]), axis=triple(axes[k])
-        )
-        for k in range(3)
+        Revolute(name=f"R{k}", bodies=pair, anchor=triple(points[k]), axis=triple(axes[k]))
+        for k, pair in enumerate(pairwise(names))
     ]
     dampings = (0.1, 10.0 ** rng.uniform(1, 3), 0.01)
     loads = [
@@ -244,18 +249,10 @@ def chain_of_twenty(rng: Rng) -> Scene:
     """Return twenty rods on alternating ball joints and hinges that hang nearly straight, with a spring at
     the last rod."""
     steps = np.array([0.0, 0.0, -0.1]) + 0.01 * rng.normal(size=(20, 3))
-    points = np.cumsum(np.vstack([np.zeros(3), steps]), axis=0)
-    names = ["ground", *(f"b{k}" for k in range(20))]
-    bodies = [rod(n, p, q, rng, 0.3) for n, p, q in zip(names[1:], points[:-1], points[1:], strict=True)]
+    names, points, bodies = rods(steps, rng, 0.3)
     joints = [
-        joint(
-            f"J{k}",
-            "revolute" if k % 2 else "universal",
-            (names[k], names[k + 1]),
-            triple(points[k]),
-            direction(rng),
-        )
-        for k in range(20)
+        joint(f"J{k}", "revolute" if k % 2 else "universal", pair, triple(points[k]), direction(rng))
+        for k, pair in enumerate(pairwise(names))
     ]
     spring = Spring(
         bodies=("b19", "ground"),

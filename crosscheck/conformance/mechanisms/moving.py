@@ -45,6 +45,8 @@ BODY = Body(
     position=(0.3, -0.2, 0.1), orientation=tuple(rotations.from_vector(np.array([0.3, -1.2, 0.5])).tolist()),
 )  # fmt: skip
 BEARING = Spherical(name="bearing", bodies=("ground", "hub"), anchor=(-0.4, 0.3, 0.1))
+HINGE = Revolute(name="H", bodies=("ground", "hub"), anchor=(-0.4, 0.3, 0.1), axis=(0.3, -0.4, 1.0))
+BALL = Spherical(name="J", bodies=("hub", "body"), anchor=(0.0, 0.0, 0.0))
 SPIN = (1.5, -2.0, 2.5)  # rad/s
 DRIVEN = Driver(joint="J", polynomial=(-0.3 * float(np.sin(0.7)), 0.8, -0.5),
                 sine=Sine(amplitude=0.3, frequency=6.0, phase=0.7))  # fmt: skip
@@ -114,9 +116,7 @@ def spinning_loop() -> Scene:
         Spherical(name="C", bodies=("rod", "lever"), anchor=(0.65, 0.35, 0.3)),
         Revolute(name="D", bodies=("lever", "ground"), anchor=(0.8, 0.0, 0.0), axis=(-0.5, 0.3, 1.0)),
     )  # fmt: skip
-    return _launched(
-        Scene(name="loop", gravity=GRAVITY, duration=DURATION, body=(crank, rod, lever), joint=joints)
-    )
+    return _launched("loop", (crank, rod, lever), joints)
 
 
 def door() -> Scene:
@@ -126,7 +126,7 @@ def door() -> Scene:
         Revolute(name=name, bodies=("ground", "body"), anchor=(0.1 + h * axis).tolist(), axis=axis.tolist())
         for name, h in (("low", -0.4), ("high", 0.5))
     )
-    return _launched(Scene(name="door", gravity=GRAVITY, duration=DURATION, body=(BODY,), joint=hinges))
+    return _launched("door", (BODY,), hinges)
 
 
 def wound_spring() -> Scene:
@@ -146,7 +146,7 @@ def floating_pair() -> Scene:
     between them."""
     springs = (_load("spring"), TorsionSpring(joint="J", stiffness=4.0, damping=0.1, natural_angle=-0.6))
     scene = Scene(name="floating", gravity=GRAVITY, duration=0.3, body=(HUB, BODY), load=springs,
-                  joint=(replaced(JOINTS["revolute"], bodies=("hub", "body")),))  # fmt: skip
+                  joint=(_between(JOINTS["revolute"]),))  # fmt: skip
     twists = ((0.4, 1.0, -0.5, 1.0, -3.0, 2.0), (0.4, 1.0, -0.5, -2.0, 4.0, 3.0))
     return consistent(scene, np.array(twists))
 
@@ -154,12 +154,11 @@ def floating_pair() -> Scene:
 def two_drivers() -> Scene:
     """Return two successive driven hinges: one by a quartic polynomial and a wave, one by a wave of negative
     amplitude."""
-    hub = Revolute(name="H", bodies=("ground", "hub"), anchor=(-0.4, 0.3, 0.1), axis=(0.3, -0.4, 1.0))
     drivers = (
         Driver(joint="H", polynomial=(0.0, 0.8, -0.5, 0.9, -0.3), sine=Sine(amplitude=0.2, frequency=4.0)),
         Driver(joint="J", polynomial=(0.0, -0.6), sine=Sine(amplitude=-0.3, frequency=6.0)),
     )
-    joints = (hub, replaced(JOINTS["revolute"], bodies=("hub", "body")))
+    joints = (HINGE, _between(JOINTS["revolute"]))
     return Scene(name="drivers", gravity=GRAVITY, duration=1.5, body=(HUB, BODY), joint=joints,
                  driver=drivers)  # fmt: skip
 
@@ -167,7 +166,6 @@ def two_drivers() -> Scene:
 def several_springs() -> Scene:
     """Return two bodies on ball joints with two springs (one in tension, one in compression), two forces, and
     two moments on one body."""
-    joints = (BEARING, Spherical(name="J", bodies=("hub", "body"), anchor=(0.0, 0.0, 0.0)))
     points = ((-0.3, 0.6, 0.0), (0.4, -0.1, 0.1))
     springs = (
         Spring(bodies=("hub", "body"), points=points, stiffness=30.0, damping=0.5, natural_length=0.5),
@@ -180,47 +178,35 @@ def several_springs() -> Scene:
         Moment(body="hub", moment=(0.3, 0.2, -0.4)),
         Moment(body="hub", moment=(0.1, -0.2, 0.5)),
     )
-    return _launched(
-        Scene(name="springs", gravity=GRAVITY, duration=DURATION, body=(HUB, BODY), joint=joints,
-              load=springs + pushes)
-    )  # fmt: skip
+    return _launched("springs", (HUB, BODY), (BEARING, BALL), springs + pushes)
 
 
 def dampers_alone() -> Scene:
     """Return two bodies on ball joints with a damper without stiffness and a spring of zero natural
     length."""
-    joints = (BEARING, Spherical(name="J", bodies=("hub", "body"), anchor=(0.0, 0.0, 0.0)))
     ends = ((-0.3, 0.6, 0.0), (0.4, -0.1, 0.1))
     links = (
         Spring(bodies=("hub", "body"), points=ends, stiffness=0.0, damping=6.0, natural_length=0.5),
         Spring(bodies=("ground", "body"), points=((0.9, -0.6, 0.4), ends[1]), stiffness=40.0,
                natural_length=0.0),
     )  # fmt: skip
-    return _launched(
-        Scene(name="dampers", gravity=GRAVITY, duration=DURATION, body=(HUB, BODY), joint=joints, load=links)
-    )
+    return _launched("dampers", (HUB, BODY), (BEARING, BALL), links)
 
 
 def two_torsion_springs() -> Scene:
     """Return two successive hinges: the first with a damper only, the second with a stiff torsion spring."""
-    hub = Revolute(name="H", bodies=("ground", "hub"), anchor=(-0.4, 0.3, 0.1), axis=(0.3, -0.4, 1.0))
-    joints = (hub, replaced(JOINTS["revolute"], bodies=("hub", "body")))
+    joints = (HINGE, _between(JOINTS["revolute"]))
     springs = (TorsionSpring(joint="H", stiffness=0.0, damping=0.3, natural_angle=2.0),
                TorsionSpring(joint="J", stiffness=9.0, damping=0.0, natural_angle=-0.6))  # fmt: skip
-    return _launched(
-        Scene(name="torsions", gravity=GRAVITY, duration=DURATION, body=(HUB, BODY), joint=joints,
-              load=springs)
-    )  # fmt: skip
+    return _launched("torsions", (HUB, BODY), joints, springs)
 
 
 def light_and_heavy() -> Scene:
     """Return a light, small body on a heavy hub; the masses differ by a factor of about 1e5."""
     heavy = replaced(HUB, mass=200.0, inertia=100.0 * np.array(HUB.inertia))
     light = replaced(BODY, mass=0.00075, inertia=np.array(BODY.inertia) / 200000.0)
-    joints = (BEARING, replaced(JOINTS["revolute"], bodies=("hub", "body")))
-    return _launched(
-        Scene(name="masses", gravity=GRAVITY, duration=DURATION, body=(heavy, light), joint=joints)
-    )
+    joints = (BEARING, _between(JOINTS["revolute"]))
+    return _launched("masses", (heavy, light), joints)
 
 
 def rounded_velocities() -> Scene:
@@ -249,23 +235,30 @@ def consistent(scene: Scene, twists: np.ndarray) -> Scene:
 def _pair(joint: Joint, driver: tuple[Driver, ...] = (), load: tuple[Load, ...] = ()) -> Scene:
     """Return ground, a hub on a ball joint, and a body on the given joint; a driver starts at the joint's
     initial coordinate."""
-    between = replaced(joint, bodies=("hub", "body"))
-    scene = Scene(name="pair", gravity=GRAVITY, duration=DURATION, body=(HUB, BODY), joint=(BEARING, between),
-                  driver=driver, load=load)  # fmt: skip
-    moving = _launched(scene)
-    if not scene.driver:
+    moving = _launched("pair", (HUB, BODY), (BEARING, _between(joint)), load, driver)
+    if not driver:
         return moving
     hub, body = moving.body  # the driver determines the motion of the body relative to the hub
     return moving.with_(body=(hub, replaced(body, velocity=None, angular_velocity=None)))
 
 
-def _launched(scene: Scene) -> Scene:
-    return consistent(scene, np.tile([0.4, 0.3, -0.5, *SPIN], (len(scene.body), 1)) * _sides(scene))
+def _between(joint: Joint) -> Joint:
+    """Return the joint between the hub and the body."""
+    return replaced(joint, bodies=("hub", "body"))
 
 
-def _sides(scene: Scene) -> np.ndarray:
-    """Return factors (nb, 1), +1 and -1, that make neighbouring bodies turn in opposite directions."""
-    return np.array([[1.0 if k % 2 else -0.8] for k in range(len(scene.body))])
+def _launched(
+    name: str,
+    bodies: tuple[Body, ...],
+    joints: tuple[Joint, ...],
+    loads: tuple[Load, ...] = (),
+    drivers: tuple[Driver, ...] = (),
+) -> Scene:
+    """Return a scene whose neighbouring bodies turn in opposite directions, as their joints allow."""
+    scene = Scene(name=name, gravity=GRAVITY, duration=DURATION, body=bodies, joint=joints, load=loads,
+                  driver=drivers)  # fmt: skip
+    sides = np.array([[1.0 if k % 2 else -0.8] for k in range(len(bodies))])
+    return consistent(scene, np.tile([0.4, 0.3, -0.5, *SPIN], (len(bodies), 1)) * sides)
 
 
 def _alone(load: tuple[Load, ...]) -> Scene:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 from crosscheck.conformance.mechanisms.features import feature_scenes
 from crosscheck.conformance.mechanisms.specimens import Specimen
@@ -35,29 +36,25 @@ Links = Mapping[str, tuple[Point, Point]]  # name → ends of a rod at t = 0
 def planar_loops() -> dict[str, Scene]:
     """Return scenes by name: each mechanism under gravity, with a force, a moment, a spring, a torsion spring
     and a driver."""
+    driver = Driver(joint="A", polynomial=(0.0, 1.0), sine=Sine(amplitude=0.1, frequency=5.0))
     found = {}
     for name, (links, joints) in MECHANISMS.items():
-        bodies, first = [_rod(body, *ends) for body, ends in links.items()], next(iter(links))
-        last, place = [*links][-1], _middle(*[*links.values()][-1])
-        loads: dict[str, Sequence[Load]] = {
-            "gravity": (),
-            "force": (Force(body=last, point=place, force=(2.0, -1.0, 0.0)),),
-            "moment": (Moment(body=first, moment=(0.0, 0.0, 0.4)),),
-            "spring": (
-                Spring(
-                    bodies=("ground", last),
-                    points=((0.1, 0.9, 0.0), place),
-                    stiffness=20.0,
-                    damping=0.3,
-                    natural_length=0.4,
-                ),
-            ),
-            "torsion spring": (TorsionSpring(joint="A", stiffness=3.0, damping=0.05, natural_angle=0.5),),
+        first, last, place = next(iter(links)), [*links][-1], _middle(*[*links.values()][-1])
+        ends = (0.1, 0.9, 0.0), place
+        spring = Spring(bodies=("ground", last), points=ends, stiffness=20.0, damping=0.3, natural_length=0.4)
+        twist = TorsionSpring(joint="A", stiffness=3.0, damping=0.05, natural_angle=0.5)
+        parts: dict[str, dict[str, tuple[Load | Driver, ...]]] = {
+            "gravity": {},
+            "force": {"load": (Force(body=last, point=place, force=(2.0, -1.0, 0.0)),)},
+            "moment": {"load": (Moment(body=first, moment=(0.0, 0.0, 0.4)),)},
+            "spring": {"load": (spring,)},
+            "torsion spring": {"load": (twist,)},
+            "driver": {"driver": (driver,)},
         }
-        for load, given in loads.items():
-            found[f"planar {name}: {load}"] = _scene(name, load, bodies, joints, tuple(given), ())
-        driver = Driver(joint="A", polynomial=(0.0, 1.0), sine=Sine(amplitude=0.1, frequency=5.0))
-        found[f"planar {name}: driver"] = _scene(name, "driver", bodies, joints, (), (driver,))
+        bodies = tuple(_rod(body, *ends) for body, ends in links.items())
+        plain = Scene(name=name, gravity=DOWN, duration=DURATION, body=bodies, joint=tuple(joints))
+        for part, given in parts.items():
+            found[f"planar {name}: {part}"] = plain.with_(name=f"planar {name}: {part}", **given)
     return found
 
 
@@ -76,25 +73,6 @@ def is_planar(simulator: Engine) -> bool:
     spatial = feature_scenes()["loop"]
     under_gravity = planar_loops()["planar four-bar: gravity"]
     return simulator.cannot(spatial) is not None and simulator.cannot(under_gravity) is None
-
-
-def _scene(
-    name: str,
-    load: str,
-    bodies: Sequence[Body],
-    joints: Sequence[Joint],
-    loads: tuple[Load, ...],
-    drivers: tuple[Driver, ...],
-) -> Scene:
-    return Scene(
-        name=f"planar {name}: {load}",
-        gravity=DOWN,
-        duration=DURATION,
-        body=tuple(bodies),
-        joint=tuple(joints),
-        load=loads,
-        driver=drivers,
-    )
 
 
 def _middle(first: Point, second: Point) -> tuple[float, float, float]:
@@ -124,32 +102,16 @@ def _slide(name: str, bodies: tuple[str, str], at: Point, along: Point) -> Joint
     return Translational(name=name, bodies=bodies, anchor=(*at, 0.0), axis=(*along, 0.0))
 
 
-def _four_bar() -> tuple[Links, Sequence[Joint]]:
-    links = {
-        "crank": ((0.0, 0.0), (0.1, 0.2)),
-        "coupler": ((0.1, 0.2), (0.6, 0.35)),
-        "rocker": ((0.6, 0.35), (0.5, 0.0)),
-    }
-    return links, (
-        _hinge("A", ("ground", "crank"), (0.0, 0.0)),
-        _hinge("B", ("crank", "coupler"), (0.1, 0.2)),
-        _hinge("C", ("coupler", "rocker"), (0.6, 0.35)),
-        _hinge("D", ("ground", "rocker"), (0.5, 0.0)),
-    )
-
-
-def _slider_crank() -> tuple[Links, Sequence[Joint]]:
-    links = {
-        "crank": ((0.0, 0.0), (0.1, 0.15)),
-        "rod": ((0.1, 0.15), (0.5, 0.05)),
-        "piston": ((0.5, 0.05), (0.5, 0.05)),
-    }
-    return links, (
-        _hinge("A", ("ground", "crank"), (0.0, 0.0)),
-        _hinge("B", ("crank", "rod"), (0.1, 0.15)),
-        _hinge("C", ("rod", "piston"), (0.5, 0.05)),
-        _slide("D", ("ground", "piston"), (0.5, 0.05), (1.0, 0.0)),
-    )
+def _loop(
+    names: Sequence[str], points: Sequence[Point], slides: Mapping[str, Point]
+) -> tuple[Links, Sequence[Joint]]:
+    """Return rods between successive points, with joints A, B, … at the points, the first and the last one to
+    the ground; ``slides`` has the directions of joints that are no hinges."""
+    pairs = [("ground", names[0]), *pairwise(names), ("ground", names[-1])]
+    return dict(zip(names, pairwise(points), strict=True)), [
+        _slide(name, pair, at, slides[name]) if name in slides else _hinge(name, pair, at)
+        for name, pair, at in zip("ABCDE", pairs, points, strict=False)
+    ]
 
 
 def _inverted_slider_crank() -> tuple[Links, Sequence[Joint]]:
@@ -167,25 +129,12 @@ def _inverted_slider_crank() -> tuple[Links, Sequence[Joint]]:
     )
 
 
-def _five_bar() -> tuple[Links, Sequence[Joint]]:
-    links = {
-        "left": ((0.0, 0.0), (-0.1, 0.25)),
-        "upper left": ((-0.1, 0.25), (0.2, 0.5)),
-        "upper right": ((0.2, 0.5), (0.5, 0.3)),
-        "right": ((0.5, 0.3), (0.4, 0.0)),
-    }
-    return links, (
-        _hinge("A", ("ground", "left"), (0.0, 0.0)),
-        _hinge("B", ("left", "upper left"), (-0.1, 0.25)),
-        _hinge("C", ("upper left", "upper right"), (0.2, 0.5)),
-        _hinge("D", ("upper right", "right"), (0.5, 0.3)),
-        _hinge("E", ("ground", "right"), (0.4, 0.0)),
-    )
+FOUR_BAR = _loop(("crank", "coupler", "rocker"), ((0.0, 0.0), (0.1, 0.2), (0.6, 0.35), (0.5, 0.0)), {})
 
 
 def _six_bar() -> tuple[Links, Sequence[Joint]]:
     """Return Watt's six-bar linkage: a four-bar whose rocker drives a second loop."""
-    links, joints = _four_bar()
+    links, joints = FOUR_BAR
     more = {"link": ((0.55, 0.175), (0.9, 0.3)), "arm": ((0.9, 0.3), (1.0, 0.0))}
     return {**links, **more}, (
         *joints,
@@ -195,10 +144,16 @@ def _six_bar() -> tuple[Links, Sequence[Joint]]:
     )
 
 
-MECHANISMS = {
-    "four-bar": _four_bar(),
-    "slider-crank": _slider_crank(),
+MECHANISMS: dict[str, tuple[Links, Sequence[Joint]]] = {
+    "four-bar": FOUR_BAR,
+    "slider-crank": _loop(
+        ("crank", "rod", "piston"), ((0.0, 0.0), (0.1, 0.15), (0.5, 0.05), (0.5, 0.05)), {"D": (1.0, 0.0)}
+    ),
     "inverted slider-crank": _inverted_slider_crank(),
-    "five-bar": _five_bar(),
+    "five-bar": _loop(
+        ("left", "upper left", "upper right", "right"),
+        ((0.0, 0.0), (-0.1, 0.25), (0.2, 0.5), (0.5, 0.3), (0.4, 0.0)),
+        {},
+    ),
     "six-bar": _six_bar(),
 }

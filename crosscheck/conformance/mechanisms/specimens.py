@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
-from crosscheck.conformance.mechanisms.closed_forms import CLOSED_FORMS, Exact
+from crosscheck.conformance.mechanisms.closed_forms import CLOSED_FORMS, GEARED, Exact
 from crosscheck.conformance.mechanisms.features import feature_scenes
-from crosscheck.conformance.mechanisms.geared_forms import GEARED
 from crosscheck.conformance.mechanisms.large_graphs import large_graph
 from crosscheck.conformance.mechanisms.moving import dead_end, moving_probes
 from crosscheck.conformance.mechanisms.random_scenes import mechanism
