@@ -49,6 +49,7 @@ def test_ground_as_frame_saves_six_coordinates_and_rows(name):
 
 
 def test_rank_of_the_four_bar_is_one_less_at_its_straight_pose():
+    """Of 19 rows one is redundant at any pose, and a second one where all links are in line."""
     assert mbref.counts(SCENES["four_bar"]()).rank == 18
     assert mbref.counts(SCENES["four_bar_straight"]()).rank == 17
 

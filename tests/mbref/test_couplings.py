@@ -81,7 +81,7 @@ def test_reaction_of_a_hinge_includes_the_torque_of_its_armature():
         ("inline", "displacement"),
     ],
 )
-def test_coupling_takes_the_angle_of_a_joint_that_has_one_and_else_the_displacement(kind, coordinate):
+def test_coupling_takes_the_angle_of_a_joint_that_has_one_and_otherwise_the_displacement(kind, coordinate):
     axle = JOINT_TYPES[kind].at("A", ("ground", "disc"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
     scene = gear_pair()
     scene = scene.with_(joint=(axle.model_copy(update={"bodies": scene.joint[0].bodies}), scene.joint[1]))

@@ -311,9 +311,9 @@ def test_names_in_a_picture_are_escaped_and_it_has_no_script():
 
 
 def test_png_has_two_pixels_for_each_of_the_svg():
+    """Bytes 16 to 24 of a PNG are its width and height (PNG specification, IHDR)."""
     picture = still(SCENES["four_bar"](), width=300.0)
     data = png(picture)
-    """Bytes 16 to 24 of a PNG are its width and height (PNG specification, IHDR)."""
     height = float(ET.fromstring(picture).attrib["height"])
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     assert (int.from_bytes(data[16:20]), int.from_bytes(data[20:24])) == (600, 2 * height)

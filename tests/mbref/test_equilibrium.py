@@ -86,7 +86,11 @@ def test_commands_print_stability_reactions_and_frequency_of_a_pendulum(tmp_path
     assert f"vibration 1: {frequency:.6g}" in shown and "<animate" in (tmp_path / "mode.svg").read_text()
     assert main(["modes", path, "--starts", "6", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["stability"] == "stable"
-    assert main(["equilibrium", path, "--starts", "2", "--number", "9"]) == 2
+
+
+def test_number_of_an_equilibrium_beyond_those_found_is_refused(tmp_path, capsys):
+    pendulum().save(path := tmp_path / "my.toml")
+    assert main(["equilibrium", str(path), "--starts", "2", "--number", "9"]) == 2
     assert "--number: must be from 1 to" in capsys.readouterr().err
 
 

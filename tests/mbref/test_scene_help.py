@@ -427,6 +427,7 @@ def test_slow_progress_prints_more_than_an_hour_left(capsys):
 
 
 def test_progress_in_a_pipe_prints_at_most_a_line_in_ten_seconds(capsys):
+    """A run of 2 s is at 0.1, 0.5, 0.6 and 1.5 s when the clock shows 1, 12, 13 and 30 s."""
     now = iter([0.0, 1.0, 12.0, 13.0, 30.0])
     lines = Lines("simulating", 2.0, lambda: next(now))
     for done in (0.1, 0.5, 0.6, 1.5):

@@ -33,8 +33,8 @@ from mbref.stepping.ranks import MOST_RANKED_ROWS, are_clear
 
 @given(bodies=st.integers(1, 12), rows=st.integers(1, 40), seed=st.integers(0, 999))
 def test_sparse_factor_solves_and_multiplies_as_dense_matrices(bodies, rows, seed):
-    """Random blocks of two bodies a row; S = D Dᵀ with its diagonal times 1 + 1/α, solved, multiplied and
-    factorised densely."""
+    """Random blocks of two bodies a row make D and S = D Dᵀ, with its diagonal times 1 + 1/α. By dense
+    matrices: the residual of S b = r, Dᵀ r, r - D x, and the pivots of Cholesky's factor of S over √S_ii."""
     rng, n = np.random.default_rng(seed), 6 * bodies
     columns = 6 * rng.integers(0, bodies, rows)[:, None] + np.arange(6)
     second = np.where(rng.random(rows) < 0.3, bodies, (columns[:, 0] // 6 + 1) % (bodies + 1))
