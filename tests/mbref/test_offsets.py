@@ -49,8 +49,8 @@ def gap(found: np.ndarray, exact: np.ndarray) -> float:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_gear_pair_starts_at_its_offset_by_the_least_displacement_and_turns_from_there(method):
-    """Least J_A a² + J_B b² with b = c + r a: a = -r J_B c / J and b = J_A c / J, J = J_A + r² J_B. A torque M
-    turns A from there by M t² / 2 J."""
+    """Least J_A a² + J_B b² with b = c + r a: a = -r J_B c / J and b = J_A c / J, J = J_A + r² J_B. A torque
+    M turns A from there by M t² / 2 J."""
     times, offset, ratio = np.linspace(0, 2, 21), 0.4, -0.5
     motion = mbref.simulate(shifted(gear_pair, "teeth", offset), method=method, times=times, rtol=1e-13)
     inertia = 0.03 + ratio**2 * 0.2
@@ -63,7 +63,7 @@ def test_gear_pair_starts_at_its_offset_by_the_least_displacement_and_turns_from
 
 @pytest.mark.parametrize("method", METHODS)
 def test_rack_starts_at_its_offset_by_the_least_displacement_and_falls_from_there(method):
-    """Least J a² + m b² with b = c + r a, J = 0.2 kg m², m = 1.5 kg; it falls by m g / (m + J / r²) t² / 2."""
+    """Least J a² + m b² with b = c + r a, J = 0.2 kg m², m = 1.5 kg; its fall: m g / (m + J / r²) t² / 2."""
     times, offset, ratio = np.linspace(0, 1, 11), 0.003, 0.05
     motion = mbref.simulate(shifted(rack, "teeth", offset), method=method, times=times, rtol=1e-13)
     inertia = 0.2 + ratio**2 * 1.5
