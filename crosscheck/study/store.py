@@ -80,12 +80,13 @@ def unpacked(folder: Path) -> Iterator[Path]:
 
 
 def _extract(path: Path, place: str) -> None:
+    import zlib
     from lzma import LZMAError
 
     try:
         with zipfile.ZipFile(path) as archive:
             archive.extractall(place)
-    except (zipfile.BadZipFile, LZMAError, EOFError, NotImplementedError):
+    except (zipfile.BadZipFile, LZMAError, zlib.error, EOFError, RuntimeError):
         raise RecordsError(f"{path}: is damaged; restore it") from None
 
 
