@@ -33,6 +33,7 @@ FASTER = 0.1  # largest relative error of a clock that is tried
 NEAR = 1e-3  # rad; rounding by which a wrapped angle may exceed its interval
 REFINED = 3  # intervals in which a fitted number is refined, each a thousandth of the former
 LISTED = 4  # exchanged columns that are named; of more, their bodies and joints are named
+LEAST_VARIATION = 0.1  # of a recorded column / variation that another unit gives it
 INSIDE = 0.8  # least fraction of the samples at which a shifted motion is known
 
 
@@ -83,8 +84,13 @@ def _units(d: Difference) -> Iterator[Stated]:
 
 
 def _is_visible(d: Difference, scaled: Columns) -> bool:
-    """Return whether a number exceeds the rounding of its cell: zeros are no motion in another unit."""
-    return any((np.abs(column) > d.allowed.get(name, 0.0)).any() for name, column in scaled.items())
+    """Return whether a number exceeds the rounding of its cell, and the recorded column varies as well: zeros
+    and constants are no motion in another unit."""
+    return any(
+        (np.abs(column) > d.allowed.get(name, 0.0)).any()
+        and np.ptp(d.recorded[name]) >= LEAST_VARIATION * np.ptp(column)
+        for name, column in scaled.items()
+    )
 
 
 def _factors(d: Difference) -> Iterator[Stated]:
@@ -126,14 +132,18 @@ def _turns(d: Difference) -> Iterator[Stated]:
 
 
 def _shifts(d: Difference) -> Iterator[Stated]:
-    """Return all columns shifted by a time, at the samples that the exact motion then has."""
+    """Return all columns, or all velocities, shifted by a time, at samples that the exact motion then has."""
     size = float(d.times[-1] - d.times[0])
+    rates = [n for n in d.recorded if SI[kind_of(n)] in ("m/s", "rad/s")]
+    for title, names in (("all columns", list(d.recorded)), ("all velocities and rates", rates)):
 
-    def later(shift: float) -> Columns | None:
-        return _at(d, d.times - shift)
+        def later(shift: float, names: list[str] = names) -> Columns | None:
+            found = _at(d, d.times - shift)
+            return found and {n: found[n] for n in names}
 
-    if size > 0 and (shift := _best(d, later, size * SHIFTS)) and (columns := later(shift)):
-        yield f"all columns: later by {shift:.6g} s", 2, columns
+        if names and size > 0 and (shift := _best(d, later, size * SHIFTS)) and (columns := later(shift)):
+            word = "later" if shift > 0 else "earlier"
+            yield f"{title}: {word} by {abs(shift):.6g} s", 2, columns
 
 
 def _clocks(d: Difference) -> Iterator[Stated]:

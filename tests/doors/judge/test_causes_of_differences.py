@@ -116,6 +116,35 @@ def noisy(scene: Scene, table: Table) -> Table:
     return {n: c if n == "time" else c + 1e-3 * rng.standard_normal(len(c)) for n, c in table.items()}
 
 
+def rows(choose: Callable[[np.ndarray], np.ndarray], *parts: str) -> Callable[[Scene, Table], Table]:
+    """Return the change of columns with these parts in their names, by default of all, to other rows, whose
+    numbers ``choose`` returns; the times stay."""
+
+    def of(_: Scene, table: Table) -> Table:
+        chosen = choose(np.arange(len(table["time"])))
+        changes = {n: n != "time" and any(p in n for p in parts or ("",)) for n in table}
+        return {n: c[chosen] if changes[n] else c[: len(chosen)] for n, c in table.items()}
+
+    return of
+
+
+def in_body_axes(scene: Scene, table: Table) -> Table:
+    """Angular velocities in axes of the body, as engines compute them."""
+    found = dict(table)
+    for body in scene.body:
+        names = [f"{body.name}.angular_velocity.{a}" for a in "xyz"]
+        q = np.array([table[f"{body.name}.orientation.{a}"] for a in "wxyz"]).T
+        inner = rotations.rotate(rotations.conjugate(q), np.array([table[n] for n in names]).T)
+        found.update(zip(names, inner.T, strict=True))
+    return found
+
+
+def half_a_step_late(scene: Scene, table: Table) -> Table:
+    """Velocities of a leapfrog method: half a step after the positions."""
+    late = motion(scene, table["time"] + table["time"][1] / 2)
+    return {n: late[n] if "velocity" in n or "rate" in n else c for n, c in table.items()}
+
+
 def shuffled(scene: Scene, table: Table) -> Table:
     rng = np.random.default_rng(6)
     return {n: c if n == "time" else rng.permutation(c) for n, c in table.items()}
@@ -149,6 +178,16 @@ EVERYWHERE = {
     "noise": (noisy, NOTHING),
     "shuffled rows": (shuffled, NOTHING),
 }
+MORE = {  # slow everywhere
+    "inches": (scaled(1 / 0.0254, ".position"), "in inches, not m"),
+    "turns a minute": (scaled(30 / np.pi, ".angular_velocity"), "in revolutions a minute, not rad/s"),
+    "held values": (rows(lambda k: k // 2 * 2), "each value is repeated for"),
+    "a lost row": (rows(lambda k: np.delete(k, 17)), NOTHING),
+    "rows of a body a row late": (rows(lambda k: np.maximum(k - 1, 0), "r.", "d."), NOTHING),
+    "a column that stays": (rows(lambda k: 0 * k, "r.position.y", "d.position.y"), NOTHING),
+    "reversed rows": (rows(lambda k: k[::-1]), NOTHING),
+    "half a step": (half_a_step_late, "all velocities and rates: earlier by 0.0"),
+}
 SIMULATED = {
     "clock": (faster_clock, "clock of the table is fast by 0.0001"),
     "clock, angles alone": (angles_alone(faster_clock), "clock"),
@@ -157,6 +196,7 @@ SIMULATED = {
     "gravity, angles alone": (angles_alone(heavier), "gravity of"),
 }
 OF_ONE_SCENE = {
+    ("double_pendulum", "body axes"): (in_body_axes, NOTHING),
     # five causes explain the two equal angles of a parallelogram
     ("four_bar_gravity", "clock, angles alone"): (angles_alone(faster_clock), NOTHING),
     ("four_bar_gravity", "gravity, angles alone"): (angles_alone(heavier), NOTHING),
@@ -183,9 +223,16 @@ OF_ONE_SCENE = {
 def cases() -> list[object]:
     """Return scenes, changes and parts of their sentences; all but those of the rod, which moves fastest, are
     slow. No gravity acts on the rod."""
-    named = {(s, n): case for s in SCENES for n, case in {**EVERYWHERE, **SIMULATED}.items()} | OF_ONE_SCENE
+    named = {
+        (s, n): case for s in SCENES for n, case in {**EVERYWHERE, **MORE, **SIMULATED}.items()
+    } | OF_ONE_SCENE
     return [
-        pytest.param(scene, *case, id=f"{scene}-{name}", marks=[pytest.mark.slow] * (scene != "spinning_rod"))
+        pytest.param(
+            scene,
+            *case,
+            id=f"{scene}-{name}",
+            marks=[pytest.mark.slow] * (scene != "spinning_rod" or name in MORE),
+        )
         for (scene, name), case in named.items()
         if scene != "spinning_rod" or "gravity" not in name
     ]

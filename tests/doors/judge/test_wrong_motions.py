@@ -109,22 +109,6 @@ def test_a_rotation_is_measured_by_its_angle(make, angle):
     assert found["error"] == found["rotation_error"] and found["position_error"] < 1e-12
 
 
-def test_error_of_delayed_uniform_motions_is_their_speed_times_the_delay():
-    """Bodies with 3 m/s and 5 rad/s, later by 7 ms."""
-    scene, truth, exact = exact_of(flying)
-    late = 0.007
-    delayed = replace(
-        exact,
-        position=exact.position - late * exact.velocity,
-        orientation=rotations.multiply(
-            rotations.from_vector(-late * exact.angular_velocity), exact.orientation
-        ),
-    )
-    found = measure(scene, delayed, truth)
-    assert found["position_error"] == pytest.approx(3.0 * late / scene_length(scene), rel=1e-9)
-    assert found["rotation_error"] == pytest.approx(5.0 * late, rel=1e-9)
-
-
 @pytest.mark.parametrize("late", [1e-5, 1e-4])
 def test_error_of_a_delayed_mechanism_is_its_largest_speed_times_the_delay(late):
     """Within the relative change of speed during the delay (s), which is less than a hundred delays."""
