@@ -26,7 +26,7 @@ MEANINGS = {  # meanings of stabilisations and integrators
     "dop853": "Runge-Kutta of order 8 with adaptive steps",
     "rk4": "classical Runge-Kutta with a fixed step (s)",
     "adams": "predictor-corrector of orders 1 to 12 with adaptive steps",
-    "taylor": "power series of order 4 to 30; crosses singular positions; the default: taylor",
+    "taylor": "power series of order 4 to 30; crosses singular positions; the default",
 }
 
 
