@@ -22,7 +22,7 @@ from mbref.kernels.layout import MEMORY, OK
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.simulation.start_run import start_run
+from mbref.simulation.runs import start_run
 from mbref.stepping.limits import Limits
 from mbref.stepping.run import Run
 

@@ -23,7 +23,7 @@ from mbref.kernels.layout import MEMORY
 from mbref.method import Method
 from mbref.motions.trajectory import Cost, Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.simulation.start_run import start_run
+from mbref.simulation.runs import start_run
 from mbref.stepping.limits import Limits
 
 for kind in ("WARNING", "ERROR"):  # of SUNDIALS: a run that fails says so itself

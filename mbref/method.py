@@ -193,25 +193,14 @@ class Method:
         head, _, integrator = name.partition("/")
         if integrator.partition("[")[0] == SERIES_METHOD:
             raise MethodError(f"{SERIES_METHOD} has no formulation and no stabilisation: use {integrator}")
-        formulation, plus, stabilisation = _split_outside_brackets(head)
-        if not plus:
-            stabilisation = "none"
+        names = re.split(r"\+(?![^[]*\])", head, maxsplit=1)  # not at the + of [alpha=1e+5]
+        formulation, stabilisation = (*names, "none")[:2]
         parts = (
             _part(formulation, FORMULATIONS, "formulation", options),
             _part(stabilisation, STABILISATIONS, "stabilisation", options),
             _part(integrator or "dop853", INTEGRATORS, "integrator", options),
         )
         return Method(*parts, options)
-
-
-def _split_outside_brackets(text: str) -> tuple[str, str, str]:
-    """Split at the + that joins two parts, but not at a + inside an option such as [1e+5]."""
-    depth = 0
-    for k, character in enumerate(text):
-        depth += (character == "[") - (character == "]")
-        if character == "+" and depth == 0:
-            return text[:k], "+", text[k + 1 :]
-    return text, "", ""
 
 
 def _text(name: str, options: Mapping[str, float]) -> str:

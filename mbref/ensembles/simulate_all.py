@@ -13,7 +13,7 @@ from mbref.equations.parts import shape_of
 from mbref.method import Method
 from mbref.motions.motion import Motion
 from mbref.scene import Scene
-from mbref.simulation.other_runs import DROPS
+from mbref.simulation.runs import DROPS
 from mbref.simulation.simulate import checked_run, finish_run, simulate
 from mbref.stepping import preparation
 from mbref.stepping.limits import Limits

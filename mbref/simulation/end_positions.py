@@ -17,7 +17,7 @@ import numpy as np
 
 from mbref.equations.branches import MOST_BRANCHED_ROWS
 from mbref.equations.units import unit_rows
-from mbref.simulation.other_runs import trial_of
+from mbref.simulation.runs import trial_of
 from mbref.stepping.run import Run
 
 TAKES_PART = 0.05  # entry of a left null vector / largest entry: rows with smaller entries are ignored

@@ -21,10 +21,9 @@ from mbref.motions.motion import Motion
 from mbref.motions.trajectory import Cost, Outcome
 from mbref.scene import Scene
 from mbref.scene.structure import bushings
+from mbref.simulation.advice import advice_on_rounding, remedy
 from mbref.simulation.end_positions import ROUNDED, Met, is_at_dead_position, is_near, met_by
-from mbref.simulation.other_runs import trial_of
-from mbref.simulation.remedies import remedy
-from mbref.simulation.rounded_numbers import advice
+from mbref.simulation.runs import trial_of
 from mbref.stepping.leaving import begins_at_rest, fits_no_branch, leaving_acceleration
 from mbref.stepping.loop import (
     CREEPING,
@@ -237,7 +236,7 @@ def _remedy(run: Run, status: int) -> str:
     """Return the remedy for an early end; if rows are nearly dependent at the start, a remedy for the
     scene."""
     if not run.memory.equations.system.settings.nearly_dependent or run.memory.loop.clock.time > 0.0:
-        return (advice(run) if status in OF_ROUNDING else "") or remedy(run, status)
+        return (advice_on_rounding(run) if status in OF_ROUNDING else "") or remedy(run, status)
     turned = run.model.closed_loops > 0 and not run.scene.driver
     return NEARLY_DEPENDENT.format(run.ranks.least) + (NEAR_SINGULAR_HINT.format(NEARLY) if turned else "")
 

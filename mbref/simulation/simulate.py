@@ -25,9 +25,8 @@ from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
 from mbref.scene.structure import bushings
 from mbref.scenes import find_scene
-from mbref.simulation.other_runs import compare_with_default
 from mbref.simulation.outcome import trajectory_of
-from mbref.simulation.start_run import start_run
+from mbref.simulation.runs import compare_with_default, start_run
 from mbref.stepping import preparation
 from mbref.stepping.limits import GENERATED, Limits
 from mbref.stepping.loop import DONE

@@ -16,9 +16,9 @@ from mbref.method import Method
 from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
 from mbref.scenes import find_scene
-from mbref.simulation.rounded_numbers import advice
+from mbref.simulation.advice import advice_on_rounding
+from mbref.simulation.runs import start_run
 from mbref.simulation.simulate import Limits
-from mbref.simulation.start_run import start_run
 
 TURN = rotations.from_vector(np.array([0.3, -0.7, 0.5]))
 LOOPS = ("four_bar_gravity", "planar_slider_crank", "spatial_slider_crank_gravity")
@@ -112,4 +112,4 @@ def test_singular_start_gets_no_advice_on_rounding():
     """Also scenes with rows that are redundant, or dependent at the start, in full digits."""
     for name in ("four_bar_straight", "four_bar_gravity", "sarrus"):
         start = start_run(find_scene(name), Method.parse("taylor"), np.array([0.1]), Limits())
-        assert advice(start) == "", name
+        assert advice_on_rounding(start) == "", name

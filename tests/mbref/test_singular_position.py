@@ -16,7 +16,7 @@ from mbref.scenes import SCENES, find_scene
 from mbref.scenes.five_bar import five_bar_gravity
 from mbref.scenes.four_bar import four_bar_gravity
 from mbref.scenes.planar_slider_crank import slider_crank
-from mbref.simulation.start_run import start_run
+from mbref.simulation.runs import start_run
 
 WATCHING = (
     "alf-dual+projection",

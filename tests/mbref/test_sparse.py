@@ -26,8 +26,8 @@ from mbref.linear_algebra.sparse_lu import factorise_product
 from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
 from mbref.method import Method
 from mbref.scenes import find_scene
+from mbref.simulation.runs import start_run
 from mbref.simulation.simulate import Limits, simulate
-from mbref.simulation.start_run import start_run
 from mbref.stepping.ranks import MOST_RANKED_ROWS, are_clear
 
 

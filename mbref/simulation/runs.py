@@ -1,4 +1,4 @@
-"""Other runs of a scene that follow a run: the comparison with the default method, and trials by `taylor`.
+"""Runs of a scene: their start, their comparison with the default method, and trials by `taylor`.
 
 Without projection only the accelerations keep a run on its branch. At a singular position the accelerations
 are ill-determined. A pseudo-inverse whose rank drops at the singular position lets the run continue along
@@ -13,6 +13,7 @@ A trial shows how far `taylor` follows a motion on which another method failed, 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -23,11 +24,12 @@ from mbref.input_error import InputError
 from mbref.kernels.layout import SINGULAR_AHEAD
 from mbref.method import MOST_BODIES, SERIES_METHOD, Method, crossing_method
 from mbref.motions.error_estimate import distances
+from mbref.scene import Scene
 from mbref.scene.structure import bushings
-from mbref.simulation.start_run import start_run
+from mbref.stepping.explicit import ExplicitStepper
 from mbref.stepping.limits import GENERIC, Limits
 from mbref.stepping.loop import DONE, LEFT_MOTION, UNDECIDED
-from mbref.stepping.run import Run
+from mbref.stepping.run import Run, Stepper
 
 MOST_COMPARED_STEPS = 100_000  # steps of the run by the default method
 TOLERANCE = 1e-10  # relative tolerance of the run by the default method
@@ -37,6 +39,23 @@ DROPS = 1e-10  # rank tolerance above which independent rows may be dropped
 NEAR = 0.1  # relative pivot below which a projected run was near a singular position
 COARSE = 0.1  # allowed distance (lengths or rad) of a run in fixed steps, whose error no tolerance limits
 MOST_TRIAL_STEPS = 2000  # largest number of steps of a trial, which takes a fraction of a second
+
+
+def start_run(scene: Scene, method: Method, times: np.ndarray, limits: Limits) -> Run:
+    """Return the run of a scene, ready to be advanced; its stepper may raise NoGeneratedCode."""
+    began = time.process_time()
+    run = Run(scene, method, times, limits, _series_stepper() if method.is_series else ExplicitStepper)
+    run.built = time.process_time() - began - run.making
+    return run
+
+
+def _series_stepper() -> Callable[[Run], Stepper]:
+    """Return the stepper of Taylor series, with its kernels loaded; other methods do not import it."""
+    from mbref.taylor.preparation import prepare_series
+    from mbref.taylor.stepper import SeriesStepper
+
+    prepare_series()
+    return SeriesStepper
 
 
 def compare_with_default(run: Run, ended: int) -> int:
