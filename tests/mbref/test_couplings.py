@@ -15,14 +15,6 @@ from tests.helpers.coupled_mechanisms import EVERY, gear_pair, pendulum
 NO_SLIDE = "is revolute, which has no displacement to be coupled"
 
 
-def coordinates(scene: Scene, method: str, name: str, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Angle and displacement of a joint."""
-    motion = mbref.simulate(scene, method=method, times=times, rtol=1e-13)
-    assert motion.outcome.name == "COMPLETED", motion.message
-    found = motion.joint(name)
-    return found.angle, found.displacement
-
-
 def test_violation_of_a_coupling_counts_full_turns():
     """With a ratio that is off by 0.01 the violation of φ_B = r φ_A is 0.01 φ_A, also after 15 turns."""
     motion = mbref.simulate(gear_pair(), times=np.linspace(0, 3, 61), rtol=1e-13)

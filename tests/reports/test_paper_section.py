@@ -102,6 +102,11 @@ def tables(blocks: list, word: str) -> list[Table]:
     return [b for b in blocks if isinstance(b, Table) and word in b.header]
 
 
+def cells(table: Table) -> list[dict[str, str]]:
+    """Return the cells of each row by the headings of their columns."""
+    return [dict(zip(table.header, row, strict=True)) for row in table.rows]
+
+
 def test_score_counts_the_three_changed_cells(records):
     """Two of them end at another time, one with another outcome."""
     score = paper.score(records)
@@ -122,7 +127,7 @@ def test_changed_cells_are_listed_with_their_causes(blocks):
     """0.0566 s is the next singular position; 1 of 20 random starts ends as printed; the five-bar's run
     crosses every singular position; the violation of LM2 grows."""
     [found] = tables(blocks, "Measured")
-    reasons = {row[:3]: row[5] for row in found.rows}
+    reasons = {(c["Table"], c["Column"], c["Method"]): c["Measured"] for c in cells(found)}
     assert len(reasons) == 3, reasons
     late = reasons["I", "θ₂ = π/4", "MPI (SVD)"]
     assert "θ₂ = -2π" in late and "1 of 20 draws end as printed; " in late, late
@@ -179,32 +184,35 @@ def test_exponent_of_a_growing_violation_is_the_power_put_in(records, power):
 
 
 def test_tables_show_the_paper_s_and_the_records_ratios_of_steps(blocks):
-    """Steps and end times of the paper's Tables III and IV; records have 1000 steps each: 50 steps/s to 20 s
-    over 400 steps/s to 2.5 s."""
+    """Steps a second in the paper: 103 of LM2 + CP and 3303 of LM2 (Table III), 1368 and 2428 of ALF + CP and
+    LM1 (IV). Records have 1000 steps each: LM2 + CP to 20 s, LM2 to 2.5 s."""
     third, fourth = tables(blocks, "steps, ratio printed")
-    assert third.rows[2][3] == f"{103 / 3303:.3f}", third.rows[2]
-    assert fourth.rows[-1][3] == f"{1368 / 2428:.3f}", fourth.rows[-1]
-    assert third.rows[2][4] == f"{2.5 / 20:.3f}", third.rows[2]
+    printed = third.header.index("steps, ratio printed")  # the column of our ratio follows
+    in_iii, in_iv = ({row[0]: row[printed : printed + 2] for row in t.rows} for t in (third, fourth))
+    assert in_iii["LM2 + CP"] == (f"{103 / 3303:.3f}", f"{2.5 / 20:.3f}"), in_iii
+    assert in_iv["ALF + CP"][0] == f"{1368 / 2428:.3f}", in_iv
 
 
 def test_incomplete_sweep_is_shown_as_far_as_it_got(records):
     """Records with "data errors 1e-8" are missing: their score is 0 cells and a dash; all others of the sweep
     end by violation (c) at 0.0315 s, and of random starts except seed 1 at 0.2 s."""
     [scores, sizes, times, drawn] = [b for b in paper_sweep.render(records) if isinstance(b, Table)]
-    count = {row[0]: row[4] for row in scores.rows}
+    count = {row["Varied"]: row["Cells"] for row in cells(scores)}
     assert count["data errors 1e-8 m"] == "0" and count["rtol 1e-5"] == "25", count
     assert all("–" in row and "0.0315 c" in row for row in times.rows), times.rows[0]
-    assert {cell for row in sizes.rows for cell in row[2:]} == {"0.032 c (8 of 8)"}, sizes.rows
-    last = {row[-1] for row in drawn.rows if row[1] not in runs.LASTING}
-    assert last == {"0.2000 c"}, f"ends of the last draw: {last}"
+    ends = {end for row in cells(sizes) for name, end in row.items() if name not in ("Errors, m", "Method")}
+    assert ends == {"0.032 c (8 of 8)"}
+    last_draw = drawn.header[-1]
+    assert {row[last_draw] for row in cells(drawn) if row["Method"] not in runs.LASTING} == {"0.2000 c"}
 
 
 def test_exact_crank_record_follows_the_true_branch(records):
     """It never leaves the true motion ("–"), crosses 61 singular positions (θ = 61.0 π), at the true rate."""
     [found] = [b for b in paper_cranks.render(records) if isinstance(b, Table)]
-    assert {row[6] for row in found.rows} == {"–"}
-    assert {row[7] for row in found.rows if row[0] == "a = b"} == {"61"}
-    assert all(row[9] == row[10] for row in found.rows)
+    [off] = [name for name in found.header if name.startswith("Off by")]
+    assert {row[off] for row in cells(found)} == {"–"}
+    assert {row["Passed by then"] for row in cells(found) if row["Lengths"] == "a = b"} == {"61"}
+    assert all(row["Crank, rad/s"] == row["True"] for row in cells(found))
 
 
 def test_exact_accelerations_have_all_digits(records):

@@ -71,6 +71,7 @@ def test_markup_in_a_message_is_escaped(tmp_path):
 
 
 def test_markdown_shows_eight_figures_as_png_and_svg(written):
+    """Two scenes have four figures each."""
     text = (written / "report.md").read_text()
     shown = re.findall(r"!\[[\w-]+\]\(([^)]+)\)", text)
     assert len(set(shown)) == 8, shown
