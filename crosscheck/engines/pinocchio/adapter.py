@@ -18,6 +18,8 @@ import numpy as np
 from crosscheck.engine import Cannot, Engine, Owner, Setting
 from crosscheck.engines.pinocchio import compiled_run
 from crosscheck.engines.pinocchio.families import (
+    ALTERNATIVES,
+    CHOSEN,
     COMPILED,
     FAMILIES,
     OPTIONS,
@@ -44,6 +46,7 @@ class Pinocchio(Engine):
     package = "pin"
     supports = SUPPORTS
     families, options, integrated_here = FAMILIES, OPTIONS, tuple(FAMILIES)
+    alternatives = ALTERNATIVES
 
     def version(self) -> str:
         """Version of Pinocchio; raises ImportError when it is not installed."""
@@ -64,8 +67,14 @@ class Pinocchio(Engine):
         return sweep(scene, rate)
 
     def serves(self, scene: Scene, family: str) -> bool:
-        """Return whether `settings` offers the family for the scene; `tuned` is offered for every scene."""
-        return family == "tuned" or super().serves(scene, family)
+        """Return whether a family can run a scene; `tuned` and `chosen` run every scene."""
+        return family in ("tuned", CHOSEN) or super().serves(scene, family)
+
+    def settings_of(self, scene: Scene, family: str) -> Sequence[Setting]:
+        """Return the settings of a family; of `chosen` the first of the alternatives."""
+        if family == CHOSEN:
+            return [next(iter(ALTERNATIVES[0].ways.values()))]
+        return super().settings_of(scene, family)
 
     def own_code(self, scene: Scene, setting: Setting) -> str:
         """Return the settings of constraintDynamics; empty if crosscheck's DOP853 integrates."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from crosscheck.engine import Setting
+from crosscheck.engine import Alternatives, Setting
 from crosscheck.engines.pinocchio import compiled_run
 from crosscheck.engines.shared.fixed_steps import turning
 from mbref.scene import Scene
@@ -14,6 +14,7 @@ LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
 STEPS = (0.2, 0.06, 0.02, 0.006, 0.002)  # rad turned per fixed step, for each setting
 # rad turned per step, for the stabilised family only; in the others closure errors dominate
 FINEST = 0.0007
+CHOSEN = "chosen"
 FIXED = ("defaults", "proximal", "baumgarte")
 DOP853_COMPILED, TUNED_COMPILED = "dop853, compiled", "tuned, compiled"
 COMPILED = (DOP853_COMPILED, TUNED_COMPILED)
@@ -27,6 +28,8 @@ FAMILIES = {
     DOP853_COMPILED: "like dop853, without Python: constraintDynamics of its C++ library called by a "
     "compiled DOP853; needs a C++ compiler and the package cmeel-eigen",
     TUNED_COMPILED: "like tuned, without Python; needs a C++ compiler and cmeel-eigen",
+    CHOSEN: "like proximal with the solver's parameters mu and iterations, or with the new constraint models "
+    "of Pinocchio 4, solved here",
 }
 # change of the forces (N), mu, iterations: needed for accelerations near singular positions
 CONVERGED = 1e-9, 1e-8, 50
@@ -35,7 +38,23 @@ OPTIONS = {
     "rtol": "relative tolerance of a step",
     "min_step": "shortest step, s",
     "beta": "decay rate of the closure errors, a double root, 1/s",
+    "mu": "proximal parameter of the constraint solver",
+    "iterations": "largest number of its iterations",
+    "models": "constraint models: legacy or new",
 }
+# with a larger mu the iteration ends early where rows are nearly dependent
+LEGACY = {"step": 5e-4, "mu": CONVERGED[1], "iterations": 200, "models": "legacy"}
+ALTERNATIVES = (
+    Alternatives(
+        {
+            "constraintDynamics, mu 1e-8": Setting(CHOSEN, LEGACY),
+            "constraintDynamics, mu 1e-6": Setting(CHOSEN, {**LEGACY, "mu": 1e-6}),
+            "constraintDynamics, mu 1e-10": Setting(CHOSEN, {**LEGACY, "mu": 1e-10}),
+            "new constraint models": Setting(CHOSEN, {**LEGACY, "models": "new"}),
+        },
+        1e-5,  # forces of redundant closures have rounding of 1e-16 / mu
+    ),
+)
 
 
 def sweep(scene: Scene, rate: float) -> list[Setting]:

@@ -12,8 +12,9 @@ from scipy.linalg import solve_triangular
 
 from crosscheck.engine import Setting
 from crosscheck.engines.pinocchio import compiled_run
-from crosscheck.engines.pinocchio.families import BAUMGARTE, CONVERGED, FIXED, TUNED_COMPILED
+from crosscheck.engines.pinocchio.families import BAUMGARTE, CHOSEN, CONVERGED, FIXED, TUNED_COMPILED
 from crosscheck.engines.pinocchio.model import Loads, Mechanism
+from crosscheck.engines.pinocchio.new_models import NewModels
 from crosscheck.engines.shared.driver_motion import motion, stated_rate
 from crosscheck.engines.shared.sampling import Adaptive, Counts, Failed, Sample, rk4
 from crosscheck.engines.shared.tree_reactions import LinkMotion, sample_of
@@ -57,6 +58,7 @@ class Simulation:
         self.frames = [mechanism.frame(k) for k in range(len(mechanism.tree.links))]
         self.still = self.loads.fixed and not self.loads.joint_springs and not self.driven
         self.y = np.concatenate([mechanism.q0, mechanism.v0])
+        self.new: NewModels | None = None
         self._configure(setting)
 
     def _configure(self, setting: Setting) -> None:
@@ -75,7 +77,12 @@ class Simulation:
         self.hint = HINTS.get(family, "")
         given = ((), ()) if family == "defaults" else (CONVERGED, FORCES)
         self.solver, self.sampler = (pin.ProximalSettings(*options) for options in given)
-        if family in FIXED:
+        options = setting.options
+        if family == CHOSEN:
+            solver = pin.ProximalSettings(CONVERGED[0], options["mu"], options["iterations"])
+            self.solver = self.sampler = solver
+            self.new = NewModels(pin, self.model, self.closures) if options["models"] == "new" else None
+        if family in (*FIXED, CHOSEN):
             self.step: Step = partial(self._rk4, setting.options["step"])
         elif family in ("dop853", "tuned"):
             settle = self.projected if family == "tuned" else None
@@ -137,6 +144,8 @@ class Simulation:
     def accelerations(self, t: float, q: np.ndarray, v: np.ndarray, solver: Any) -> np.ndarray:
         """Return joint accelerations (nv,) from Pinocchio."""
         tau = self.loads.constant if self.still else self.loads.torques(t, q, v)
+        if self.new:
+            return self.new.accelerations(q, v, tau)
         return self.pin.constraintDynamics(
             self.model, self.data, q, v, tau, self.closures, self.closure_data, solver
         )
@@ -225,7 +234,10 @@ class Simulation:
     def closing(self) -> list[np.ndarray]:
         """Return the wrench on the second link of each closure of the tree."""
         wrenches = [np.zeros(6) for _ in self.mechanism.tree.closures]
-        for k, closure, data in zip(self.mechanism.closed, self.closures, self.closure_data, strict=True):
-            place, force = self.data.oMi[closure.joint1_id] * closure.joint1_placement, data.contact_force
+        forces = [data.contact_force for data in self.closure_data]
+        if self.new:
+            forces = [self.pin.Force(np.resize(f, 6) * (np.arange(6) < len(f))) for f in self.new.forces]
+        for k, closure, force in zip(self.mechanism.closed, self.closures, forces, strict=True):
+            place = self.data.oMi[closure.joint1_id] * closure.joint1_placement
             wrenches[k] = -place.act(force).vector
         return wrenches
