@@ -7,14 +7,13 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-import mbref
 from crosscheck.engine import Owner, Setting, engine
 from crosscheck.judge.constraints import closure, joint_coordinates
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Driver, Scene, Sine
 from mbref.scenes import SCENES
 from tests.crosscheck.measured import MARGIN, ROUNDING, completed_error
-from tests.crosscheck.tree_scenes import BODIES, every_joint, ring
+from tests.crosscheck.tree_scenes import BODIES, every_joint
 
 if find_spec("opensim") is None:
     pytest.skip("the optional engine Simbody needs opensim", allow_module_level=True)
@@ -30,10 +29,6 @@ PAPER = {  # scene: duration (s), measured error (m, rad)
     "four_bar_gravity": (0.15, 9.2e-11),
     "five_bar_gravity": (0.15, 1.1e-10),
 }
-ALIKE, REACTION = (
-    3.5e-10,
-    7.4e-11,
-)  # from Pinocchio: of the largest value, at least 1; of the largest reaction
 FAMILIES = ("merson", "feldberg", "cpodes")
 
 
@@ -60,27 +55,6 @@ def test_accuracy_of_a_hundredth_reduces_simbody_s_error_fivefold(family: str) -
         completed_error(simulate(scene, 0.02, accuracy, family), scene) for accuracy in (1e-4, 1e-6, 1e-8)
     ]
     assert errors[1] < errors[0] / 5 and errors[2] < errors[1] / 5, f"{family}: errors {errors}"
-
-
-@pytest.mark.parametrize(
-    "scene",
-    [every_joint(), *map(ring, ("revolute", "cylindrical", "universal", "spherical"))],
-    ids=lambda scene: scene.name,
-)
-def test_simbody_and_pinocchio_move_alike(scene: Scene) -> None:
-    """Every joint and load; loops cut at joints of every kind; joint reactions where they are unique."""
-    pytest.importorskip("pinocchio")
-    run = simulate(scene, scene.duration, 1e-10, samples=4)
-    other = engine("pinocchio").run(scene, run.times, Setting("tuned", {"rtol": 1e-11, "min_step": 1e-4}))
-    assert run.outcome is other.outcome is Outcome.COMPLETED, (run.message, other.message)
-    for field in ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration"):
-        ours, theirs = getattr(run, field), getattr(other, field)
-        gap = abs(ours - theirs).max() / max(1.0, abs(theirs).max())
-        assert gap < MARGIN * ALIKE, f"{scene.name}: {field} differs by {gap:.2e}"
-    if not mbref.counts(scene).redundant:
-        for joint, wrench in other.reactions.items():
-            gap = abs(run.reactions[joint] - wrench).max() / abs(wrench).max()
-            assert gap < MARGIN * REACTION, f"reaction in {joint}: relative difference {gap:.2e}"
 
 
 def prescribed(*drivers: Driver) -> Scene:

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-import mbref
 from crosscheck.conformance.mechanisms.closed_forms import free_fall
 from crosscheck.engine import Setting, engine
 from mbref import rotations
@@ -15,7 +14,6 @@ from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Body, Driver, Revolute, Scene, TorsionSpring
 from mbref.scenes import SCENES
 from tests.crosscheck.measured import MARGIN, completed_error, error_of_samples
-from tests.crosscheck.tree_scenes import driven, every_joint, ring
 
 pytest.importorskip("sksundae", reason="the optional engine SUNDIALS needs scikit-sundae")
 
@@ -29,14 +27,6 @@ REGULAR = {  # scene: duration (s) without a singular position, measured error (
     "five_bar": (0.012, 1.1e-8),
     "four_bar_gravity": (0.15, 7.9e-8),
 }
-ALIKE = {  # measured differences from Pinocchio: m, m/s, rad/s, m/s², rad/s²
-    "position": 2.8e-6,
-    "velocity": 3.7e-5,
-    "angular_velocity": 1.1e-4,
-    "acceleration": 6.5e-4,
-    "angular_acceleration": 2.5e-3,
-}
-REACTION = 3e-5  # of the largest
 
 
 def simulate(scene: Scene, duration: float, rtol: float, samples: int = 6) -> Trajectory:
@@ -60,24 +50,6 @@ def test_tolerance_of_a_hundredth_reduces_ida_s_error_fivefold() -> None:
     scene = SCENES["spatial_slider_crank"]()
     errors = [completed_error(simulate(scene, 0.01, rtol), scene) for rtol in (1e-4, 1e-6, 1e-8)]
     assert errors[1] < errors[0] / 5 and errors[2] < errors[1] / 5
-
-
-@pytest.mark.parametrize(
-    "scene", [every_joint(), driven(), ring("universal"), ring("revolute")], ids=lambda scene: scene.name
-)
-def test_ida_and_pinocchio_move_alike(scene: Scene) -> None:
-    """Every joint, driver and load; redundant loops; joint reactions where they are unique."""
-    pytest.importorskip("pinocchio")
-    run = simulate(scene, scene.duration, 1e-7, 4)
-    other = engine("pinocchio").run(scene, run.times, Setting("tuned", {"rtol": 1e-10, "min_step": 1e-4}))
-    assert run.outcome is other.outcome is Outcome.COMPLETED, (run.message, other.message)
-    for field, measured in ALIKE.items():
-        gap = abs(getattr(run, field) - getattr(other, field)).max()
-        assert gap < MARGIN * measured, f"{scene.name}: {field} differs by {gap:.2e}, measured {measured:.1e}"
-    if not mbref.counts(scene).redundant:
-        for joint, wrench in other.reactions.items():
-            gap = abs(run.reactions[joint] - wrench).max() / abs(wrench).max()
-            assert gap < MARGIN * REACTION, f"reaction in {joint}: relative difference {gap:.2e}"
 
 
 def test_ida_swings_a_torsion_spring_past_two_turns_as_the_closed_form() -> None:

@@ -1,4 +1,4 @@
-"""MuJoCo and Pinocchio on scenes with every joint, driver and load, against Gauss's principle."""
+"""Engines on scenes with every joint, driver and load, against Gauss's principle."""
 
 from __future__ import annotations
 
@@ -34,15 +34,14 @@ from mbref.scene import (
 from tests.crosscheck.measured import MARGIN
 from tests.crosscheck.tree_scenes import BODIES, INERTIA, JOINTS, driven, every_joint, ring
 
-pytest.importorskip("mujoco")
-pytest.importorskip("pinocchio")
-
 # worst differences measured, parts of the largest value; Gauss's principle is integrated to 1.8e-9
-MEASURED = {"pinocchio": 1.8e-9, "mujoco": 1.2e-7, "forward": 1.2e-8}
+MEASURED = {"pinocchio": 1.8e-9, "mujoco": 1.2e-7, "forward": 1.2e-8, "simbody": 1.3e-10, "sundials": 7.1e-6}
 FINE = {
     "pinocchio": Setting("tuned", {"rtol": 1e-11, "min_step": 1e-4}),
     "mujoco": Setting("tuned", {"step": 2e-4, "beta": 100.0, "hard": 1e-8}),
     "forward": Setting("forward", {"rtol": 1e-10, "min_step": 1e-4, "beta": 100.0, "hard": 1e-7}),
+    "simbody": Setting("merson", {"accuracy": 1e-10}),
+    "sundials": Setting("ggl", {"rtol": 1e-7}),
 }
 X, Y, Z, O = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
 
@@ -121,11 +120,17 @@ def exact(name: str) -> Trajectory:
     return with_exact_reactions(scene, gauss_motion(scene, times))
 
 
-@pytest.mark.parametrize("name", ALL)
-@pytest.mark.parametrize("setting", FINE)
-def test_mujoco_and_pinocchio_move_and_react_by_gauss_s_principle(name: str, setting: str) -> None:
+OPTIONAL = {"simbody": "opensim", "sundials": "sksundae.ida"}
+CASES = [(setting, name) for setting in FINE if setting not in OPTIONAL for name in ALL]
+CASES += [("simbody", name) for name in ALL if name == "every joint" or name.startswith("ring")]
+CASES += [("sundials", name) for name in ("every joint", "driven", "ring universal", "ring revolute")]
+
+
+@pytest.mark.parametrize(("setting", "name"), CASES)
+def test_engines_move_and_react_by_gauss_s_principle(name: str, setting: str) -> None:
     """Poses, rates, accelerations, unique reactions and the resultants on each body, relative to the largest;
     allowed is 10 times the difference measured (MEASURED)."""
+    pytest.importorskip(OPTIONAL.get(setting, setting if setting != "forward" else "mujoco"))
     scene, true = ALL[name], exact(name)
     simulator = engine("mujoco" if setting == "forward" else setting)
     run = simulator.run(scene, true.times, FINE[setting])
