@@ -20,8 +20,9 @@ LARGE = ("chain_of_twenty", "tumbling_chain")  # a run in thirty digits takes mi
 SHORTER = {"stiff_chain": 0.3, "stiff_dampers": 0.2, "rounded_door": 0.5}  # s; duration of the test
 
 
-def assert_bounded(kind: str, seed: int) -> None:
-    """Compare the reference at five times with a closed form, or with a run in thirty digits."""
+def error_over_bound(kind: str, seed: int) -> float:
+    """Return the largest error of the reference at five times over its bound, by a closed form or by a run in
+    thirty digits."""
     scene = awkward(kind, seed)
     times = np.linspace(0.0, SHORTER.get(kind, scene.duration), 5)
     motions = runs(scene, times, SECONDS)
@@ -31,7 +32,7 @@ def assert_bounded(kind: str, seed: int) -> None:
         off = error_series(scene, trajectory(scene, found), closed_form(scene).poses(found.times))
     else:
         off = differences(scene, motions[0], in_many_digits(scene, found.times))
-    assert (off <= found.bound).all(), f"{off.max():.1e} away, bound {found.bound.max():.1e}"
+    return float((off / found.bound).max())
 
 
 def in_many_digits(scene, times):
@@ -53,14 +54,14 @@ def in_many_digits(scene, times):
 
 @pytest.mark.parametrize("kind", QUICK)
 def test_reference_of_an_awkward_mechanism_is_within_its_bound(kind):
-    assert_bounded(kind, 0)
+    assert error_over_bound(kind, 0) <= 1
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1, 2])
 @pytest.mark.parametrize("kind", sorted(set(AWKWARD) - set(LARGE)))
 def test_reference_of_every_awkward_mechanism_is_within_its_bound(kind, seed):
-    assert_bounded(kind, seed)
+    assert error_over_bound(kind, seed) <= 1
 
 
 def test_both_formulations_of_the_reference_agree_on_a_gimbal():

@@ -6,6 +6,8 @@ spaces, ranks and least-norm accelerations.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -84,32 +86,37 @@ class Consistent:
         )
 
 
-def assert_equal_constraints(state: Consistent) -> None:
-    """Compare Φ = 0, rank and row space of the Jacobian J, and the least-norm solution of J a = γ."""
+class Gaps(NamedTuple):
+    """Largest differences of three sets of constraints, in a state that closes them."""
+
+    phi: float  # |Φ|
+    spaces: float  # of the projections on the row spaces of the Jacobians J, from the polynomials'
+    accelerations: float  # of the least-norm solutions of J a = γ, over 1 + the largest one
+
+
+def gaps(state: Consistent) -> Gaps:
+    """Compare polynomials, mbref's model and the judge's joint equations."""
     sets = {"polynomials": state.polynomials(), "mbref": state.mbref(), "poses": state.poses()}
     spaces, accelerations = {}, {}
-    for name, (phi, jacobian, gamma) in sets.items():
-        assert np.abs(phi).max(initial=0) < MARGIN * ROUNDING, (
-            f"{name}: Φ = {np.abs(phi).max():.1e} where others are closed"
-        )
+    for name, (_, jacobian, gamma) in sets.items():
         _, sizes, rows = np.linalg.svd(jacobian)
         rank = int(np.sum(sizes > RANK * sizes.max(initial=0)))
         spaces[name] = rows[:rank].T @ rows[:rank]
         accelerations[name] = np.linalg.lstsq(jacobian, gamma, rcond=RANK)[0]
-    ranks = {name: round(np.trace(space)) for name, space in spaces.items()}
-    assert len(set(ranks.values())) == 1, f"ranks {ranks}"
     scale = 1 + np.abs(accelerations["polynomials"]).max(initial=0)
-    for name in ("mbref", "poses"):
-        gap = np.abs(spaces[name] - spaces["polynomials"]).max(initial=0)
-        assert gap < MARGIN * SPACES, f"row spaces of {name} and the polynomials differ by {gap:.1e}"
-        gap = np.abs(accelerations[name] - accelerations["polynomials"]).max(initial=0) / scale
-        assert gap < MARGIN * ACCELERATIONS, f"accelerations of {name} and polynomials differ by {gap:.1e}"
+    off = [
+        max(np.abs(of[name] - of["polynomials"]).max(initial=0) for name in ("mbref", "poses"))
+        for of in (spaces, accelerations)
+    ]
+    return Gaps(max(np.abs(phi).max(initial=0) for phi, _, _ in sets.values()), off[0], off[1] / scale)
 
 
 @pytest.mark.parametrize("name", MECHANISMS)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_polynomials_mbref_and_judge_have_equal_constraints_of_mechanisms(name: str, seed: int) -> None:
-    assert_equal_constraints(Consistent(MECHANISMS[name], 0.001 * seed, seed, 0.02))
+    found = gaps(Consistent(MECHANISMS[name], 0.001 * seed, seed, 0.02))
+    assert found.phi < MARGIN * ROUNDING and found.spaces < MARGIN * SPACES
+    assert found.accelerations < MARGIN * ACCELERATIONS
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -119,9 +126,9 @@ def test_polynomials_mbref_and_judge_have_equal_constraints_of_random_joints(
 ) -> None:
     is_driven = kind in DRIVABLE and data.draw(st.booleans())
     scene = data.draw(one_joint_scenes(kind, is_driven))
-    assert_equal_constraints(
-        Consistent(scene, data.draw(st.floats(0, 0.3)), data.draw(st.integers(0, 99)), 0.1)
-    )
+    found = gaps(Consistent(scene, data.draw(st.floats(0, 0.3)), data.draw(st.integers(0, 99)), 0.1))
+    assert found.phi < MARGIN * ROUNDING and found.spaces < MARGIN * SPACES
+    assert found.accelerations < MARGIN * ACCELERATIONS
 
 
 @pytest.mark.parametrize("name", ["every_joint", "driven", "five_bar", "spatial_slider_crank_driven"])

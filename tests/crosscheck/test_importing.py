@@ -55,15 +55,16 @@ def constrained(model, data, rows) -> np.ndarray:
     return free - inverse @ np.linalg.pinv(rows @ inverse, rcond=1e-9) @ (rows @ free)
 
 
-def assert_moves_as_compiled(found: Source, loops=()) -> None:
-    """Compare accelerations (m/s², rad/s² · scene length) by Gauss's principle and MuJoCo's matrices."""
+def gap(found: Source, loops=()) -> float:
+    """Return the largest difference of accelerations (m/s², rad/s² · scene length) by Gauss's principle and
+    by MuJoCo's matrices of the file, over the largest and at least 1."""
     from crosscheck.judge.constraints import scene_length
 
     scene, theirs = found.imported.scene, accelerations(found, loops)
     theirs[len(scene.body) :] *= scene_length(scene)
     ours = gauss(scene)
     scale = max(np.abs(theirs).max(), 1.0)  # m/s²: rounding of the weight, where the loops leave no motion
-    assert np.abs(ours - theirs).max() < SAME * scale, (np.abs(ours - theirs).max(), scale)
+    return float(np.abs(ours - theirs).max() / scale)
 
 
 def read(tmp_path: Path, text: str, name: str = "model.xml", **options) -> Source:
@@ -97,20 +98,20 @@ def test_an_open_connect_of_sites_is_closed_with_the_lengths_of_the_file(tmp_pat
     assert np.linalg.norm(np.subtract(scene.joint_named("B").anchor, (0, 0, 1))) == pytest.approx(0.25)
     assert any("'C' was open by 0.5" in note for note in found.imported.notes)
     assert 6 * len(scene.body) - rank(scene) == 1
-    assert_moves_as_compiled(found)
+    assert gap(found) < SAME
 
 
 def test_loop_closes_at_the_given_pose_of_a_joint(tmp_path):
     found = read(tmp_path, OPEN_LOOP.replace("EQUALITY", CONNECT), pose={"A": 0.4})
     assert found.qpos[0] == 0.4
-    assert_moves_as_compiled(found)
+    assert gap(found) < SAME
 
 
 def test_loop_closes_near_the_pose_of_a_keyframe(tmp_path):
     """The keyframe `low` has A at 0.5 rad; from the reference pose the loop closes with A at -0.01 rad."""
     found = read(tmp_path, OPEN_LOOP.replace("EQUALITY", CONNECT), keyframe="low")
     assert abs(found.qpos[0] - 0.5) < 0.3
-    assert_moves_as_compiled(found)
+    assert gap(found) < SAME
 
 
 def test_unknown_keyframe_or_joint_of_a_pose_is_refused_with_the_known_names(tmp_path):
@@ -135,7 +136,7 @@ def test_a_weld_without_torque_is_a_spherical_joint(tmp_path):
     weld = '<weld name="C" site1="tip" site2="toe" torquescale="0"/>'
     found = read(tmp_path, OPEN_LOOP.replace("EQUALITY", weld))
     assert found.imported.scene.joint_named("C").type == "spherical"
-    assert_moves_as_compiled(found)
+    assert gap(found) < SAME
 
 
 def test_bodies_of_a_weld_are_assembled_at_its_relative_pose(tmp_path):
@@ -151,7 +152,7 @@ def test_bodies_of_a_weld_are_assembled_at_its_relative_pose(tmp_path):
     a, b = held.imported.scene.body
     angle = 2 * np.arccos(abs(np.dot(a.orientation, b.orientation)))
     assert angle == pytest.approx(0.5, abs=1e-9)
-    assert_moves_as_compiled(held)
+    assert gap(held) < SAME
 
 
 def test_links_fixed_together_are_one_body_with_their_mass_and_moment(tmp_path):
@@ -172,7 +173,7 @@ def test_links_fixed_together_are_one_body_with_their_mass_and_moment(tmp_path):
     assert body.position == pytest.approx(((0.5 * 0.3 + 0.1 * 0.5) / 0.6, 0.0, 0.0))
     about = 0.004 + 0.5 * 0.3**2 + 0.1 * 0.5**2 - 0.6 * body.position[0] ** 2
     assert body.inertia[1] == pytest.approx(about)
-    assert_moves_as_compiled(found)
+    assert gap(found) < SAME
 
 
 def middle(first: str, second: str, apart: str = "0 0 0", more: str = "") -> str:
@@ -199,7 +200,7 @@ def test_two_hinges_of_a_massless_link_leave_two_freedoms(second, apart, joints,
     scene = found.imported.scene
     assert [joint.type for joint in scene.joint] == joints and [body.mass for body in scene.body] == masses
     assert 6 * len(scene.body) - rank(scene) == 2
-    assert_moves_as_compiled(found)
+    assert gap(found) < SAME
 
 
 def test_a_massless_link_that_carries_two_bodies_remains_a_body(tmp_path):
@@ -209,7 +210,7 @@ def test_a_massless_link_that_carries_two_bodies_remains_a_body(tmp_path):
     <joint name="j3" type="continuous"><parent link="mid"/><child link="o"/><axis xyz="1 0 0"/></joint>"""
     both = read(tmp_path, middle("0 1 0", "0 0 1", more=more), "two.urdf")
     assert [body.name for body in both.imported.scene.body if not body.mass] == ["mid"]
-    assert_moves_as_compiled(both)
+    assert gap(both) < SAME
 
 
 def test_a_massless_link_that_carries_nothing_is_left_out_with_a_note(tmp_path):
@@ -217,7 +218,7 @@ def test_a_massless_link_that_carries_nothing_is_left_out_with_a_note(tmp_path):
     <joint name="j3" type="continuous"><parent link="l"/><child link="horn"/></joint>"""
     found = read(tmp_path, middle("0 1 0", "0 0 1", more=idle), "idle.urdf")
     assert any("'horn' has no mass and carries none" in note for note in found.imported.notes)
-    assert_moves_as_compiled(found)
+    assert gap(found) < SAME
 
 
 @pytest.mark.parametrize(
@@ -230,7 +231,7 @@ def test_three_slides_and_three_rotations_at_the_root_make_a_free_body(turn, tmp
     )
     found = read(tmp_path, text)
     assert not found.imported.scene.joint
-    assert_moves_as_compiled(found)
+    assert gap(found) < SAME
 
 
 def open_chain() -> str:
@@ -258,7 +259,7 @@ def test_close_joins_two_frames_by_a_spherical_joint(tmp_path):
     found = read(tmp_path, open_chain(), "closed.urdf", close=["end_a=end_b"])
     assert found.imported.scene.joint[-1].type == "spherical" and not found.imported.notes
     assert 18 - rank(found.imported.scene) == 1
-    assert_moves_as_compiled(found, [("end_a", np.zeros(3), "end_b", np.zeros(3))])
+    assert gap(found, [("end_a", np.zeros(3), "end_b", np.zeros(3))]) < SAME
 
 
 def test_close_joins_two_frames_by_a_hinge_about_the_named_axis(tmp_path):
@@ -325,7 +326,7 @@ GEARS = """<mujoco><option gravity="0 0 -9.81"/><worldbody>
 def test_a_linear_equality_of_joints_is_a_coupling_that_the_motion_keeps(tmp_path):
     """q₂ = -2 q₁, and the first wheel turns by more than 0.01 rad in 0.2 s."""
     found = read(tmp_path, GEARS.replace("POLY", "0 -2 0 0 0"))
-    assert_moves_as_compiled(found)
+    assert gap(found) < SAME
     (coupling,) = found.imported.scene.coupling
     assert (coupling.name, coupling.joints, coupling.ratio) == ("gears", ("g1", "g2"), -2.0)
     fallen = mbref.simulate(found.imported.scene, times=[0.0, 0.2], method="alf-dual+projection/dop853")
@@ -348,7 +349,7 @@ def test_armature_of_a_hinge_adds_to_the_moment_of_inertia_about_it(tmp_path):
     body = f'<body name="f">{hinge("j", more=rotor)}{inertial}</body>'
     text = f"<mujoco><worldbody>{body}</worldbody></mujoco>"
     found = read(tmp_path, text)
-    assert_moves_as_compiled(found)
+    assert gap(found) < SAME
     turning = np.linalg.norm(gauss(found.imported.scene)[0]) / 0.05
     assert turning == pytest.approx(0.01 * 9.81 * 0.05 / (2e-6 + 0.01 * 0.05**2 + 0.005), rel=1e-12)
     assert found.imported.scene.joint[0].armature == 0.005

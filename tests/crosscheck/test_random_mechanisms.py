@@ -36,11 +36,14 @@ def compared(seed: int) -> Comparison:
     return compare(random_mechanism(seed), ENGINES)
 
 
-def check(seeds: Sequence[int]) -> None:
-    for found in map(compared, seeds):
-        for name, error in found.errors.items():
-            allowed = MARGIN * MEASURED[name] / found.distance
-            assert error <= allowed, (found.scene.name, name, found.redundant, found.distance)
+def excess(seeds: Sequence[int]) -> float:
+    """Return the largest error of accelerations over MARGIN times the measured one of its engine; an error
+    grows as the distance from a singular position falls."""
+    return max(
+        error / (MARGIN * MEASURED[name] / found.distance)
+        for found in map(compared, seeds)
+        for name, error in found.errors.items()
+    )
 
 
 def test_engines_accelerate_six_random_mechanisms_as_mbref():
@@ -48,12 +51,12 @@ def test_engines_accelerate_six_random_mechanisms_as_mbref():
     scenes = list(map(random_mechanism, SOME))
     assert {joint.type for scene in scenes for joint in scene.joint} == set(KINDS)
     assert {len(scene.joint) - len(scene.body) for scene in scenes} == {1, 2, 3}
-    check(SOME)
+    assert excess(SOME) <= 1
 
 
 @pytest.mark.slow
 def test_engines_accelerate_many_random_mechanisms_as_mbref():
-    check(MANY)
+    assert excess(MANY) <= 1
 
 
 def test_random_mechanisms_have_every_joint_type_and_up_to_three_loops():

@@ -100,15 +100,14 @@ def test_bound_of_a_mechanism_far_from_the_origin_holds_the_rounding_of_its_samp
     assert 1e-12 < lost < found.bound.max() < 1e-9
 
 
-def assert_family(name: str) -> None:
+def error_and_bound(name: str) -> tuple[float, float]:
+    """Return the largest error of a reference over its bound, by the closed form, and the largest bound."""
     scene = ALL[name]
     found, reason = samples(scene, BRIEF.get(name, scene.duration))
     truth = closed_form(scene)
     assert not reason, reason
     off = errors(scene, found, truth.poses(found.times))
-    worst = int((off / found.bound).argmax())
-    assert (off <= found.bound).all(), f"error {off[worst]:.1e} above the bound {found.bound[worst]:.1e}"
-    assert name in SINGULAR or found.bound.max() <= SMOOTH
+    return float((off / found.bound).max()), float(found.bound.max())
 
 
 QUICK = ("four_bar_gravity", "pendulum_all", "free_spring", "four_bar_chain")
@@ -116,13 +115,15 @@ QUICK = ("four_bar_gravity", "pendulum_all", "free_spring", "four_bar_chain")
 
 @pytest.mark.parametrize("name", QUICK)
 def test_reference_is_within_its_bound_of_a_known_motion(name):
-    assert_family(name)
+    error_over_bound, bound = error_and_bound(name)
+    assert error_over_bound <= 1 and bound <= (np.inf if name in SINGULAR else SMOOTH)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(ALL) - {*QUICK, "four_bar_straight"}))
 def test_reference_is_within_its_bound_of_every_known_motion(name):
-    assert_family(name)
+    error_over_bound, bound = error_and_bound(name)
+    assert error_over_bound <= 1 and bound <= (np.inf if name in SINGULAR else SMOOTH)
 
 
 def test_reference_with_contradicting_joints_is_within_its_bound_of_the_exact_motion():
@@ -182,24 +183,25 @@ def test_seed_of_the_rows_moves_contradicting_joints_by_rounding_only():
     assert 1e-17 < differences(scene, one, other).max() < 1e-14
 
 
-def assert_random(seed: int) -> None:
+def bound_of(seed: int) -> float:
+    """Return the largest bound of the reference of a random mechanism over 0.3 s."""
     scene = random_mechanism(seed)
     found, reason = samples(scene, 0.3, 4)
     assert not reason, f"random_{seed}: {reason}"
-    assert found.bound.max() <= 1e-11, f"random_{seed}: bound {found.bound.max():.1e}"
+    return float(found.bound.max())
 
 
 @pytest.mark.parametrize("seed", [3, 5])
 def test_reference_of_a_random_mechanism_has_a_bound_of_1e_11(seed):
     """Over 0.3 s; of positions / the scene's length and of angles in rad. The bound covers the difference
     between two formulations and between two precisions."""
-    assert_random(seed)
+    assert bound_of(seed) <= 1e-11
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS[4:])
 def test_references_of_more_random_mechanisms_have_a_bound_of_1e_11(seed):
-    assert_random(seed)
+    assert bound_of(seed) <= 1e-11
 
 
 def test_rows_that_become_dependent_do_not_magnify_contradictions():
@@ -337,24 +339,25 @@ def test_certified_tables_are_unedited_and_bounded_by_1e_20():
 BRIEFLY = [name for name, path in TABLES.items() if json.loads(path.read_text())["times"][-1] <= 0.05]
 
 
-def assert_within_the_bound_of_its_table(name: str) -> None:
+def error_over_bound_by_table(name: str) -> float:
+    """Return the largest error of a reference over its bound, by the certified table of twenty digits."""
     scene, table = find_certifiable(name), json.loads(TABLES[name].read_text())
     found, reason = judged(scene, table["times"], *runs(scene, table["times"], SECONDS))
     assert not reason
     place = np.array(table["position"], dtype=np.longdouble)
     off = np.linalg.norm(found.position - place, axis=-1).max(axis=-1) / constraints.scene_length(scene)
-    assert (off <= found.bound).all(), f"{off.max():.1e} from twenty digits, bound {found.bound.max():.1e}"
+    return float((off / found.bound).max())
 
 
 @pytest.mark.parametrize("name", sorted(set(BRIEFLY) & set(SCENES)))
 def test_reference_is_within_its_bound_of_the_certified_table(name):
-    assert_within_the_bound_of_its_table(name)
+    assert error_over_bound_by_table(name) <= 1
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(TABLES) - (set(BRIEFLY) & set(SCENES))))
 def test_more_references_are_within_their_bound_of_the_certified_table(name):
-    assert_within_the_bound_of_its_table(name)
+    assert error_over_bound_by_table(name) <= 1
 
 
 # --- what has none ----------------------------------------------------------------------------------------

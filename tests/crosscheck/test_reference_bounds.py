@@ -28,31 +28,32 @@ def in_many_digits(scene: Scene, times: np.ndarray) -> np.ndarray:
     return np.array([EXTENDED.dtype(x) for x in texts]).reshape(motion.position.shape)
 
 
-def assert_bounded(name: str) -> None:
-    """Compare a reference of two formulations with a run in thirty digits: it must be within its own bound,
-    of 1e-12 at most."""
+def error_and_bound(name: str) -> tuple[float, float]:
+    """Return the largest error of a reference over its bound, by a run in thirty digits, and the largest
+    bound."""
     scene = HARD[name]()
     times = np.linspace(0.0, SHORTER.get(name, scene.duration), 5)
     a, second, b = runs(scene, times, SECONDS)
     found, reason = judged(scene, times, a, second, b)
     assert not reason
-    assert found.bound.max() <= 1e-12
     place = in_many_digits(scene, times)
     off = np.abs(a.position - place).max(axis=(1, 2))
-    assert (off <= found.bound).all(), f"{off.max():.1e} from thirty digits, bound {found.bound.max():.1e}"
+    return float((off / found.bound).max()), float(found.bound.max())
 
 
 @pytest.mark.parametrize("name", QUICK)
 def test_reference_of_a_hard_mechanism_is_within_its_bound_of_thirty_digits(name):
-    """Stiff springs, rows that are redundant up to rounding, and planes; the bound is at most 1e-12."""
-    assert_bounded(name)
+    """Stiff springs, rows that are redundant up to rounding, and planes."""
+    error_over_bound, bound = error_and_bound(name)
+    assert error_over_bound <= 1 and bound <= 1e-12
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(HARD) - {*QUICK, *CROSSING}))
 def test_references_of_more_hard_mechanisms_are_within_their_bound_of_thirty_digits(name):
     """A mechanism that crosses two singular positions is left out: more digits move another mechanism."""
-    assert_bounded(name)
+    error_over_bound, bound = error_and_bound(name)
+    assert error_over_bound <= 1 and bound <= 1e-12
 
 
 @pytest.mark.parametrize("move", [natural_motion, tree_motion])
