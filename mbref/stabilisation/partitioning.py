@@ -6,10 +6,11 @@ coordinates u follow from Φ(u, v, t) = 0 by Newton–Raphson (Eq. 15), started 
 last accepted step (Eq. 16), and their rates from Φ_u u' = ν - Φ_v v' (Eq. 14).  Φ_p = 2 Φ_π' L.
 
 The partition is kept while the smallest pivot of Φ_u relative to its largest stays above ``kept`` times its
-largest value so far; then another partition is chosen, and the integrator restarts. So a partition that is
-chosen near a singular position, where its pivot is small, is replaced behind it.  With ``kept`` = 0.1
-partitions last near turning points of a coordinate, and errors are 10 to 1000 times larger than with 0.6. A
-new partition with fewer dependent coordinates ends the run: the run is at a singular position.
+largest value so far; then the partition of largest pivots is computed. It replaces the present one if its own
+smallest pivot is greater, and the integrator restarts. So a partition that is chosen near a singular position
+is replaced behind it, and a good one is kept through a singular position, where all pivots are small.  With
+``kept`` = 0.1 partitions last near turning points of a coordinate, and errors are 10 to 1000 times larger
+than with 0.6. A partition with fewer dependent coordinates ends the run: the run is at a singular position.
 """
 
 from __future__ import annotations
@@ -55,6 +56,8 @@ class Scratch(NamedTuple):
     row_order: Annotated[Indices, "m + nb"]  # active rows first
     column_order: Annotated[Indices, "7*nb"]  # dependent coordinates first
     exchanges: Annotated[Indices, "7*nb"]  # column exchanges of the factorisation
+    last_row_order: Annotated[Indices, "m + nb"]
+    last_column_order: Annotated[Indices, "7*nb"]
     partition: CoordinatePartition
 
 
@@ -278,12 +281,39 @@ def accept(t, y, memory):
     partition.largest_pivot = max(partition.largest_pivot, partition.pivot)
     if partition.pivot < options_of(memory.chart_options).kept * partition.largest_pivot:
         rank = partition.rank
-        choose_coordinates(memory)
+        replaced = replace_partition(memory)
         if partition.rank < rank:
             return SINGULAR_AHEAD
-        gather_independent(y, memory)
-        return CHANGED
+        if replaced:
+            gather_independent(y, memory)
+            return CHANGED
     return OK
+
+
+@kernel
+def copy(order, copied):
+    for i in range(order.shape[0]):
+        copied[i] = order[i]
+
+
+@kernel
+def replace_partition(memory):
+    """Choose the partition at ``memory.state``; return False and keep the last one if it is as good."""
+    scratch = scratch_of(memory.chart)
+    partition, pivot = scratch.partition, scratch.partition.pivot
+    rank = partition.rank
+    copy(scratch.row_order, scratch.last_row_order)
+    copy(scratch.column_order, scratch.last_column_order)
+    choose_coordinates(memory)
+    if partition.rank != rank:
+        return True
+    factorise_dependent(memory)
+    if pivot < partition.pivot:
+        return True
+    copy(scratch.last_row_order, scratch.row_order)
+    copy(scratch.last_column_order, scratch.column_order)
+    partition.pivot = partition.largest_pivot = pivot
+    return False
 
 
 PARTITIONING = Stabilisation(
