@@ -213,6 +213,7 @@ def test_reference_of_a_block_on_an_incline_is_the_closed_form(bodies: tuple[str
 
 @pytest.mark.parametrize("bodies", [("plate", "pin"), ("pin", "plate")], ids="-".join)
 def test_reference_of_a_swash_plate_is_the_closed_form(bodies: tuple[str, str]) -> None:
+    """The pin is at z = 0.2 + slope · radius (1 - cos ω t)."""
     scene, heights = swash_plate(bodies)
     found = referred(scene)
     assert np.abs(found.position[:, 1, 2] - heights).max() <= found.bound.max()

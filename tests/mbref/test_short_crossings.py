@@ -22,7 +22,9 @@ def with_pendulum(scene: Scene) -> Scene:
     ("name", "crossings"),
     [("four_bar", 4), ("four_bar_gravity", 3), ("five_bar_gravity", 3), ("planar_slider_crank_heavy", 61)],
 )
-def test_motion_of_one_freedom_passes_all_its_singular_positions_as_its_closed_form(name, crossings):
+def test_motion_of_one_freedom_passes_all_its_singular_positions_on_the_smooth_branch(name, crossings):
+    """The judge's closed form has one angle by the energy. A driven crank is flat every half turn, 4 times in
+    12.5 rad; swings are flat 3 times in their duration; the heavy crank makes 61 half turns."""
     scene = find_scene(name)
     run = simulate(scene, "taylor", np.linspace(0.0, scene.duration, 9), Limits(rtol=1e-9))
     assert run.outcome.label == "COMPLETED", run.message

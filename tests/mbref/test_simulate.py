@@ -81,7 +81,7 @@ def test_fast_spin_at_a_loose_tolerance_is_followed_over_every_turn(method):
 
 @pytest.mark.parametrize("method", ["lm1+none", "lm1+projection", "lm1+projection/adams", "lm1+partitioning"])
 def test_orientation_of_every_sample_is_a_unit_quaternion(method):
-    """Also at a loose tolerance, and where the joint's equations are kept by quaternions of any length."""
+    """The tolerance is loose, and quaternions of any length would satisfy the joint's equations."""
     run = completed(spinning(), method, np.linspace(0.0, 10.0, 11), Limits(rtol=1e-3))
     assert gap(np.linalg.norm(run.orientation, axis=-1), 1.0) < 1e-12
 

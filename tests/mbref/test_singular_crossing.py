@@ -233,6 +233,7 @@ def test_gap_of_the_size_of_rounding_counts_as_a_crossing(gap, passed):
 @pytest.mark.parametrize("loop", RHOMBI)
 @pytest.mark.parametrize("distance", [1e-2, 1e-4, 1e-6])
 def test_driven_start_near_the_flat_position_is_its_closed_form(loop, distance):
+    """Crank and rocker turn by the driver's angle, and the coupler does not turn."""
     assert error_of(RHOMBI[loop][0](math.pi + distance), 0.1) < 1e-9
 
 
@@ -253,6 +254,7 @@ def test_small_bead_on_a_cart_keeps_the_energy(inertia):
 @pytest.mark.parametrize("loop", RHOMBI)
 @pytest.mark.parametrize("angle", [0.3, 1e-2, math.pi - 1e-3])
 def test_driven_parallelogram_crosses_from_any_angle_as_its_closed_form(loop, angle):
+    """Crank and rocker turn by the driver's angle, and the coupler does not turn."""
     assert error_of(RHOMBI[loop][0](angle), 2.5) < 1e-11
 
 

@@ -61,6 +61,7 @@ def test_run_that_watches_the_rank_ends_at_the_first_singular_position(loop, met
 
 @pytest.mark.parametrize("loop", ["four", "five"])
 def test_message_names_the_joints_that_lose_rank(loop):
+    """All joints of the loop take part where its links are in line."""
     scene, end = LOOPS[loop]
     message = simulate(scene, "alf-dual+projection", [end]).message
     assert all(repr(joint.name) in message for joint in scene.joint), message
@@ -94,6 +95,7 @@ def test_method_that_claims_to_cross_is_right_after_the_singular_position(loop, 
 
 @pytest.mark.parametrize("method", ["alf-dual+none", "alf+baumgarte"])
 def test_regularised_method_crosses_the_flat_position_of_a_rhombus_as_its_closed_form(method):
+    """In the closed form the coupler does not turn, and the cranks have one angle, by the energy."""
     scene = four_bar_gravity()
     run = simulate(scene, method, np.linspace(0.0, 0.5, 5), Limits(rtol=1e-7))
     assert run.outcome.name == "COMPLETED", run.message
@@ -103,7 +105,7 @@ def test_regularised_method_crosses_the_flat_position_of_a_rhombus_as_its_closed
 @pytest.mark.parametrize("rtol", [1e-5, 1e-8])
 @pytest.mark.parametrize("loops", [2, 3, 5, 12])
 def test_run_ends_where_all_loops_of_a_chain_are_flat(loops, rtol):
-    """Of an even number of loops the determinant keeps its sign. Before, runs passed the first position."""
+    """With an even number of loops the determinant keeps its sign there. Before, runs went on."""
     scene = find_scene(f"four_bar_chain[{loops}]")
     run = simulate(scene, "alf-dual+projection", [2.0], Limits(rtol=rtol))
     assert run.outcome.name == "SINGULAR_POSITION", run.message

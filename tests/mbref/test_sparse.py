@@ -171,6 +171,7 @@ def test_sparse_and_dense_runs_have_equal_reactions_without_redundancy():
     [("four_bar_chain[8]", 2.0, "taylor"), ("slider_crank_chain[6]", 0.2, "taylor")],
 )
 def test_large_chain_moves_as_its_closed_form_past_singular_positions(name, end, method):
+    """All loops of a chain have one angle, by the energy; only four-bars are flat, and pass it."""
     scene, times = find_scene(name), np.linspace(0.0, end, 11)
     run = simulate(scene, method, times, Limits(rtol=1e-11))
     error = np.abs(run.position - truth_for(scene).poses(times).position).max()

@@ -88,6 +88,7 @@ def _driven(bodies: tuple[Body, ...], joints: tuple) -> Scene:
 @pytest.mark.parametrize("linkage", [scissor, bar_on_cranks])
 @pytest.mark.parametrize("seed", range(3))
 def test_tilted_linkage_passes_its_singular_positions_as_its_closed_form(linkage, seed, unit):
+    """The centres are functions of e^iθ with θ = θ₀ + 7 t, which `scissor` and `bar_on_cranks` return."""
     plane, start = Plane(seed, unit), 0.3 + 0.2 * seed
     scene, places = linkage(plane, start)
     run = simulate(scene, "taylor", TIMES)

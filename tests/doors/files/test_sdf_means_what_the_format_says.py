@@ -37,7 +37,8 @@ def sdf(*parts: str, version: str = "1.6") -> str:
 
 @pytest.mark.parametrize("name", ["world", "arm", "hand", "__model__"])
 def test_a_joint_without_a_pose_is_at_its_child_link_whatever_its_name(files, name):
-    """As the format says; "world" and "__model__" are also names of frames, and "arm" and "hand" of links."""
+    """The format has this default pose. "world" and "__model__" are also names of frames, "arm" and "hand" of
+    links."""
     text = sdf(
         link("arm", "0.5 0 0 0 0 0"),
         link("hand", "0.9 0.2 0 0 0 0"),
@@ -59,7 +60,8 @@ def test_a_joint_without_a_pose_is_at_its_child_link_whatever_its_name(files, na
     ],
 )
 def test_a_screw_moves_by_its_pitch_a_turn(files, more, metres_a_turn):
-    """As libsdformat: thread_pitch p is -2π / p m a turn, screw_thread_pitch comes first, 1 m is usual."""
+    """libsdformat's rule: thread_pitch p is -2π / p m a turn, screw_thread_pitch prevails over it, and the
+    default is 1 m."""
     scene, _ = files.scene(sdf(link("nut"), joint("s", "screw", "world", "nut", more=more)), "screw.sdf")
     motion = mbref.simulate(scene.with_(gravity=(0.0, 0.0, -9.81)), times=[0.0, 0.3])
     turned, moved = motion.joint("s").angle[-1], motion["nut"].position[-1][2]
@@ -89,7 +91,7 @@ def test_joints_of_a_mimic_with_an_offset_start_at_angles_that_obey_it(files):
     ("ratio", "reference", "offset"), [(3, 0.1, 0.3), (0.1, 0.7, 0.07), (-1.1, 1.1, -1.21)]
 )
 def test_an_offset_that_is_zero_but_for_rounding_is_exactly_zero(files, ratio, reference, offset):
-    """offset - ratio · reference vanishes, but not in binary numbers."""
+    """Numbers with offset = ratio · reference, except for the rounding of binary numbers."""
     mimic = mimics("a", ratio, offset, reference)
     text = sdf(
         link("p"),

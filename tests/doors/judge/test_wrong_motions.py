@@ -111,7 +111,7 @@ def test_a_rotation_is_measured_by_its_angle(make, angle):
 
 @pytest.mark.parametrize("late", [1e-5, 1e-4])
 def test_error_of_a_delayed_mechanism_is_its_largest_speed_times_the_delay(late):
-    """Within the relative change of speed during the delay (s), which is less than a hundred delays."""
+    """The relative tolerance is the change of speeds during the delay (s), at most a hundred delays."""
     scene, truth, exact = exact_of(double_hinge)
     times = exact.times[1:]
     delayed = replace(truth.poses(times - late), times=times)

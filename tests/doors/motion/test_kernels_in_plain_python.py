@@ -54,7 +54,8 @@ def states() -> dict[str, dict[str, list]]:
 
 
 def test_plain_and_compiled_kernels_agree_to_rounding():
-    """In all steps, and in states to a hundred roundings a step: fused multiply-adds round otherwise."""
+    """Numbers of steps are equal, and states to a hundred roundings a step: fused multiply-adds round
+    otherwise."""
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM],

@@ -101,10 +101,9 @@ def test_adams_meets_its_tolerance_with_more_steps_at_a_lower_order(options, sta
 
 @pytest.mark.parametrize("method", ["lm2+projection", "lm2+projection/adams", "taylor"])
 def test_error_of_poses_is_at_most_ten_times_the_tolerance(method):
-    found = [errors("pendulum with spring with damping", method, rtol)[0] for rtol in (1e-5, 1e-8, 1e-11)]
-    assert found[0] < 1e-4
-    assert found[1] < 1e-7
-    assert found[2] < 1e-10
+    for rtol in (1e-5, 1e-8, 1e-11):
+        pose, _, _ = errors("pendulum with spring with damping", method, rtol)
+        assert pose < 10 * rtol
 
 
 def test_feedback_bounds_the_drift_of_constraints():

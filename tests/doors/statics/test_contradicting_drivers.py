@@ -28,7 +28,8 @@ def twice_driven(first, second) -> Scene:
 @pytest.mark.parametrize("share", [1e-3, 1e-8])
 @pytest.mark.parametrize("power", [1, 2, 4])
 def test_commands_name_two_drivers_of_one_slide_whose_motions_differ(power, share, tmp_path, capsys):
-    """Of 3 t m, by a share in t, t² or t⁴: velocities or accelerations differ at first, or places later."""
+    """One driver moves the slide by 3 t m, the other by 3 t + 3 share tⁿ m, n = 1, 2 or 4: velocities or
+    accelerations differ at the start, or places later."""
     motion = [0.0, 3.0, 0.0, 0.0, 0.0]
     other = list(motion)
     other[power] += 3.0 * share

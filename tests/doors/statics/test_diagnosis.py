@@ -94,7 +94,7 @@ def printed(scene: Scene, folder: Path, capsys: pytest.CaptureFixture[str]) -> s
 
 
 def test_rod_between_two_ball_joints_is_named_as_spinning_idly_about_its_axis(tmp_path, capsys):
-    """Of its two freedoms the linkage has one without the spin."""
+    """The linkage has two freedoms: one of its motion and the spin of the coupler."""
     shown = printed(ball_linkage(), tmp_path, capsys)
     assert "degrees of freedom 2" in shown
     assert "coupler can spin about its own axis and moves nothing else" in shown
