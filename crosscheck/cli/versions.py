@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 from rich.box import SIMPLE
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from crosscheck.cli.request import RequestError, lasting
@@ -197,7 +196,7 @@ def _print(on: Console, found: Sequence[Found]) -> None:
         return
     table = Table("what", "where", "change", box=SIMPLE)
     for one in found[:SHOWN]:
-        table.add_row(*map(escape, one))
+        table.add_row(*one)
     on.print(table)
     if len(found) > SHOWN:
         on.print(f"and {len(found) - SHOWN} more: --json has all", soft_wrap=True)

@@ -144,7 +144,9 @@ def _number(verdict: Mapping[str, Any] | None) -> str:
 
 
 def _of_facts(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[Found]:
-    """Yield changed default values, and names that the adapter misses in one version."""
+    """Yield changed default values, and names that the adapter misses in one version, if both have facts."""
+    if not (old and new):
+        return
     before, after = (facts.get("defaults", {}) for facts in (old, new))
     for name in dict.fromkeys([*before, *after]):
         a, b = before.get(name, "none"), after.get(name, "none")

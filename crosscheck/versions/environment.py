@@ -1,7 +1,7 @@
 """Environments of one version of a package each, in the user's cache folder, and the versions that exist.
 
 An environment is a venv. pip installs the package there, with the user's own settings of package indexes, and
-with the versions of crosscheck's own dependencies that are installed here. crosscheck itself is on its path.
+with crosscheck's own dependencies not newer than here. crosscheck itself is on its path.
 """
 
 from __future__ import annotations
@@ -76,17 +76,17 @@ def _fill(place: Path, wanted: Requirement, pins: Sequence[str]) -> None:
         shutil.copy(own, place)  # pip's settings of this environment
     constraints = place / "constraints.txt"
     constraints.write_text("\n".join(pins))
-    _pip("--python", _python(place), "install", "--quiet", "--constraint", constraints, str(wanted))
+    _pip("--python", _python(place), "install", "--constraint", constraints, str(wanted))
     (packages,) = place.glob("lib/python*/site-packages")
     # .pth files are read in the order of their names: packages' own ones come first
     (packages / "zz_crosscheck.pth").write_text("\n".join([str(PRODUCT), *filter(None, sys.path)]))
 
 
 def _pins() -> list[str]:
-    """Return requirements with the installed versions of the packages that crosscheck needs."""
+    """Return the requirements of crosscheck, bounded by the installed versions: compiled packages of this
+    environment, such as Numba, may not work with newer ones."""
     needed = [text for text in metadata.requires("mbref") or () if ";" not in text]
-    names = [match[0] for text in needed if (match := NAME.match(text))]
-    return [f"{name}=={metadata.version(name)}" for name in names]
+    return [f"{text},<={metadata.version(found[0])}" for text in needed if (found := NAME.match(text))]
 
 
 def released(package: str) -> list[str]:
@@ -105,7 +105,7 @@ def _pip(*words: str | Path) -> str:
     command = [sys.executable, "-m", "pip", *fixed, *map(str, words)]
     done = subprocess.run(command, check=False, capture_output=True, text=True, stdin=subprocess.DEVNULL)
     if done.returncode:
-        raise NotInstalled(f"{words[-1]}: {_cause(done.stderr)}")
+        raise NotInstalled(f"{words[-1]}: {_cause(done.stdout + done.stderr)}")
     return done.stdout
 
 
@@ -122,7 +122,7 @@ def _cause(said: str) -> str:
         return f"there is no such version; known: {known[1]}"
     if "No matching distribution found" in said:
         return "no package index has a package of this name"
-    if "conflicting dependencies" in said:
-        conflict = re.findall(r"^    (.*)$", said, re.M)
-        return f"it does not install beside crosscheck's own packages: {'; '.join(conflict[:REASONS])}"
+    if conflict := re.search(r"The conflict is caused by:\n((?: +\S.*\n)+)", said):
+        parts = [line.strip() for line in conflict[1].splitlines()]
+        return f"it does not install beside crosscheck's own packages: {'; '.join(parts[:REASONS])}"
     return f"pip does not install it: {'; '.join(lines[:REASONS]) or said.strip()[-300:]}"

@@ -13,6 +13,7 @@ import json
 import math
 import pkgutil
 import sys
+import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -36,17 +37,23 @@ def facts(name: str) -> dict[str, Any]:
 
 
 def defaults_of(path: str) -> Iterator[tuple[str, Any]]:
-    """Yield (name, value) of each default: ``module.Class().part`` are public values of an object, or of a
-    part of it, and ``module.function`` the defaults of a signature."""
+    """Yield (name, value) of each default: ``module.Class().part`` are public values of an object, of its
+    part, or of the result of a method (``part()``), and ``module.function`` the defaults of a signature."""
     called, makes, part = path.partition("()")
     try:
         target = pkgutil.resolve_name(called)
         made = target() if makes else None  # kept: its parts may not outlive it
-        value = functools.reduce(getattr, filter(None, part.split(".")), made)
+        value = functools.reduce(_part, filter(None, part.split(".")), made)
     except (ImportError, AttributeError):
         yield path, "missing"
         return
     yield from _values(path, value, DEPTH) if makes else _signature(path, target)
+
+
+def _part(made: Any, name: str) -> Any:
+    """Return an attribute of an object, or the result of its method for a name with ``()``."""
+    found = getattr(made, name.removesuffix("()"))
+    return found() if name.endswith("()") else found
 
 
 def _signature(path: str, function: Any) -> Iterator[tuple[str, Any]]:
@@ -69,7 +76,8 @@ def _values(path: str, made: Any, depth: int) -> Iterator[tuple[str, Any]]:
         if name.startswith("_"):
             continue
         try:
-            value = getattr(made, name)
+            with warnings.catch_warnings(action="error"):  # a deprecated name has a successor
+                value = getattr(made, name)
         except Exception:  # a property of a library may raise anything while it has no value
             continue
         of_library = type(value).__module__.partition(".")[0] == library and not callable(value)

@@ -34,6 +34,14 @@ OWN_STEPS = {DEFAULTS: {"erp": 0.01}, BALLS: {"erp": 0.5}}
 DEFAULT_STEPS = {DEFAULTS: 1e-3}
 
 
+JOINT_DEFAULTS = (
+    "ErrorReductionParameter",
+    "MaxErrorReductionVelocity",
+    "ErrorAllowance",
+    "ConstraintForceMixing",
+)
+
+
 class Dart(SteppingEngine):
     """DART (PyPI ``dartpy``)."""
 
@@ -43,6 +51,10 @@ class Dart(SteppingEngine):
     supports = replace(EVERYTHING, massless_links=True)
     families, options, own_steps, default_steps = FAMILIES, OPTIONS, OWN_STEPS, DEFAULT_STEPS
     integrated_here, with_terms = (terms.FAMILY,), Mechanism
+    defaults_of = (
+        *(f"dartpy.simulation.World().{name}()" for name in ("getTimeStep", "getGravity")),
+        *(f"dartpy.constraint.JointConstraint.get{name}()" for name in JOINT_DEFAULTS),
+    )
     finer = 2  # the method is of first order
     scout, planar = DEFAULTS, (BALLS,)
 

@@ -56,6 +56,7 @@ class Exudyn(Linearising, Engine):
     package = "exudyn"
     supports = SUPPORTS
     families, options, integrated_here = FAMILIES, OPTIONS, ("tuned",)
+    defaults_of = ("exudyn.SimulationSettings()",)
 
     def prepare(self, families: Sequence[str]) -> None:
         _exudyn()

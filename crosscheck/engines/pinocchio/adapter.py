@@ -47,6 +47,7 @@ class Pinocchio(Engine):
     supports = SUPPORTS
     families, options, integrated_here = FAMILIES, OPTIONS, tuple(FAMILIES)
     alternatives = ALTERNATIVES
+    defaults_of = ("pinocchio.ProximalSettings()",)
 
     def version(self) -> str:
         """Version of Pinocchio; raises ImportError when it is not installed."""
