@@ -50,6 +50,7 @@ def error_of(simulator, name: str, setting: Setting) -> float:
     "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in BY_HAND]
 )
 def test_equation_derived_by_hand_gives_the_true_motion(name: str):
+    """The engine LIMIT of benchmarks/limit.py integrates it. The truth is the judge's."""
     from limit import LIMIT
 
     scene = SCENES[name]()

@@ -47,7 +47,8 @@ def test_errors_below_the_larger_bound_of_both_truths_do_not_differ(first, secon
     assert said(one(1e-10, bound=1e-12), one(9e-10, bound=1e-12)) == ["error 1.00e-10 → 9.00e-10"]
 
 
-def test_times_differ_by_a_larger_ratio_unless_both_are_repeated():
+def test_times_that_differ_by_three_quarters_are_reported_only_if_both_runs_were_repeated():
+    """A single time may be that much longer by chance: 1 s and 1.75 s."""
     fast, slow = one(1e-5, repeated=True), one(1e-5, seconds=1.75, repeated=True)
     assert said(fast, slow) == ["time 1.00e+00 s → 1.75e+00 s"]
     assert said(fast, one(1e-5, seconds=1.75)) == said(one(1e-5, seconds=1.75), fast) == []
@@ -159,6 +160,7 @@ def test_failed_runs_differ_by_their_outcome_or_by_their_end_beyond_rounding():
 
 
 def circumstance(engine: str, version: str, cpu: str, **more: Any) -> dict[str, Any]:
+    """Return the record of a run of scene "s" by a version of an engine on a processor."""
     made = {"engine": engine, "version": version, "versions": {"numpy": "2"}, "machine": {"cpu": cpu}}
     return {"scene": "s", **made, **more}
 

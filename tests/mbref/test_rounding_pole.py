@@ -25,8 +25,9 @@ def test_crossings_of_swinging_parallelograms_take_few_steps_and_are_exact(name)
 
 
 @pytest.mark.parametrize("name", ("four_bar", "five_bar"))
-def test_a_driven_singular_position_is_crossed_by_one_high_accuracy_step(name):
-    """14 steps for four singular positions; samples at the first one and 10 µs beside it are exact."""
+def test_driven_crossings_take_few_steps_and_samples_at_and_near_one_are_exact(name):
+    """At most 14 steps for 12.5 rad and four singular positions, each crossed by one high-accuracy step. The
+    samples are at the first one and 10 µs from it."""
     scene = SCENES[name]()
     first = simulate(scene, Method.parse("taylor"), [scene.duration]).crossings[0].time
     times = np.sort(np.append(np.linspace(0.0, scene.duration, 11), first + np.array([-1e-5, 0.0, 1e-5])))

@@ -113,6 +113,7 @@ def test_run_ends_where_all_loops_of_a_chain_are_flat(loops, rtol):
 
 
 def test_message_names_the_joints_of_every_flat_loop():
+    """The three loops of a chain are flat at once."""
     scene = find_scene("four_bar_chain[3]")
     message = simulate(scene, "alf-dual+projection", [2.0]).message
     assert all(repr(joint.name) in message for joint in scene.joint), message

@@ -83,7 +83,10 @@ def test_true_motion_has_no_error_and_no_violation(make):
     for name in ("error", "velocity_error", "violation_position", "violation_velocity"):
         assert found[name] <= 1e-12, name
     assert found["scd"] > 12 and found["error_bound"] <= 1e-11
-    assert found.keys() == {*METRICS, "error_bound", "error_until"}
+
+
+def test_measures_are_all_metrics_the_truth_s_bound_and_the_time_up_to_which_it_is_known():
+    assert measured(flying).keys() == {*METRICS, "error_bound", "error_until"}
 
 
 # --- poses ------------------------------------------------------------------------------------------------
