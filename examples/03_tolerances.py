@@ -2,10 +2,7 @@
 
 import numpy as np
 
-from mbref.ensembles.ensemble import ensemble
-from mbref.scene.variation import Variation, variants
-from mbref.scenes import find_scene
-from mbref.simulation.simulate import simulate
+from mbref import Variation, ensemble, find_scene, simulate, variants
 
 METHOD, COUNT = "alf-dual+projection", 200
 TIMES = np.linspace(0.0, 0.1, 6)

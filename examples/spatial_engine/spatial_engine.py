@@ -12,8 +12,7 @@ from scipy.integrate import solve_ivp
 
 from crosscheck.engine import Cannot, Engine, Owner, Setting
 from crosscheck.judge.constraints import inertia_matrices, initial_twists
-from mbref import rotations
-from mbref.motions.trajectory import Cost, Outcome, Trajectory
+from mbref import Cost, Outcome, Trajectory, rotations
 from mbref.rotations import cross
 
 # axes of the first frame that displacement keeps off, and pairs of axes kept at right angles

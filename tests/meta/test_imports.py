@@ -108,10 +108,15 @@ def test_folders_do_not_import_each_other_in_a_circle(package):
     assert {folder: circle for folder, circle in found.items() if circle} == {}
 
 
-def test_longest_chain_of_imports_in_taylor_has_at_most_nine_modules():
+@pytest.mark.parametrize(("folder", "most"), [("mbref", 12), ("mbref.taylor", 9)])
+def test_longest_chain_of_imports_in_a_folder_is_short(folder, most):
     """A module stands one floor above the highest of the modules of the folder that it imports from."""
-    arrows = children(graph("mbref"), "mbref.taylor")
-    assert max(floors(arrows).values()) <= 9, floors(arrows)
+    arrows = children(graph("mbref"), folder)
+    assert max(floors(arrows).values()) <= most, floors(arrows)
+
+
+def test_root_of_mbref_has_at_most_twelve_files():
+    assert sum(path.is_file() for path in (ROOT / "mbref").iterdir()) <= 12
 
 
 @pytest.mark.parametrize("package", FLOORS)
