@@ -136,6 +136,7 @@ def test_estimate_of_a_run_in_fixed_steps_has_no_warning():
 def test_estimate_is_the_true_error_of_an_oscillation(oscillator):
     """Closed form x = 1 + 0.2 cos 10 t; the length of the mechanism is 1.2 m, from the joint to the mass."""
     motion = simulate(oscillator, "taylor[order=4]", limits=Limits(rtol=1e-4))
+    assert motion.outcome is Outcome.COMPLETED
     true = np.abs(motion["mass"].position[:, 0] - 1 - 0.2 * np.cos(10 * motion.times)) / 1.2
     assert true.max() > 1e-10, "the run is too accurate for a test"
     assert np.abs(with_error_estimate(motion).error_estimate.error - true).max() < 1e-3 * true.max()
