@@ -24,6 +24,7 @@ from crosscheck.judge.joint_loads import turning_loads
 from crosscheck.judge.joint_reactions import resultants
 from crosscheck.judge.model_identity import acceleration_scale
 from crosscheck.judge.tolerances import LEAST_CHANGE, REACTIONS
+from crosscheck.refusals import shortened
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
 
@@ -90,7 +91,7 @@ def _ways(bench: Bench, given: Alternatives, failures: dict[str, str]) -> dict[s
             whole = completed(scene, run, len(times))
             found[name] = Way(whole, _quantities(scene, whole))
         else:
-            failures[name] = f"{name}: {run.message or run.outcome.sentence}"
+            failures[name] = shortened(f"{name}: {run.message or run.outcome.sentence}")
     return found
 
 

@@ -6,14 +6,15 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, Owner, Setting
+from crosscheck.engine import Alternatives, Cannot, Engine, Owner, Setting
 from crosscheck.engines.exudyn.dynamic import Motion, integrate, step_count
 from crosscheck.engines.exudyn.extrapolation import RICHARDSON, extrapolate
 from crosscheck.engines.exudyn.joints import SUPPORTS
@@ -38,14 +39,32 @@ SHORTEST = 5e-6  # s; for shorter steps the full-pivoting solver loses rows of t
 SPECTRAL_RADIUS = 0.9
 SCOUT = (250, 2000)  # numbers of steps of the coarse run that measures the scene's fastest rate
 SCOUT_SAMPLES = 26
+CHOSEN = "chosen"
 FAMILIES = {
     "defaults": "SolveDynamic with its default settings",
     "tuned": "three trapezoidal runs extrapolated to h = 0, restarted after singular positions",
     "trapezoidal": "the trapezoidal rule with index-2 constraints",
     "alpha": "generalised alpha",
     "static": "static analysis of a fully driven mechanism, pose by pose",
+    CHOSEN: "the linear solver and the index of the options, fixed steps, tight Newton tolerances",
 }
-OPTIONS = {"step": "largest time step, s"}
+OPTIONS = {
+    "step": "largest time step, s",
+    "solver": "type of the linear solver; EigenDense ignores redundant rows",
+    "index": "2 by the trapezoidal rule, or 3 by generalised alpha",
+}
+
+
+def _way(index: int, solver: str) -> dict[str, Setting]:
+    """Return the way of a linear solver; all but EigenDense fail and say so where rows are redundant."""
+    return {f"index {index}, {solver}": Setting(CHOSEN, {"step": 2e-4, "solver": solver, "index": index})}
+
+
+ALTERNATIVES = (
+    Alternatives(_way(2, "EigenDense") | _way(2, "EXUdense") | _way(2, "EigenSparse"), 1e-5),
+    Alternatives(_way(3, "EigenDense") | _way(3, "EXUdense") | _way(3, "EigenSparse"), 1e-5),
+    Alternatives(_way(2, "EigenDense") | _way(3, "EigenDense"), 0.05),  # measured: 0.02, of the step
+)
 
 
 class Exudyn(Linearising, Engine):
@@ -57,6 +76,7 @@ class Exudyn(Linearising, Engine):
     supports = SUPPORTS
     families, options, integrated_here = FAMILIES, OPTIONS, ("tuned",)
     defaults_of = ("exudyn.SimulationSettings()",)
+    alternatives = ALTERNATIVES
 
     def prepare(self, families: Sequence[str]) -> None:
         _exudyn()
@@ -69,7 +89,13 @@ class Exudyn(Linearising, Engine):
         return unended_piece(scene)
 
     def serves(self, scene: Scene, family: str) -> bool:
-        return scene.has_mass() if family == "tuned" else super().serves(scene, family)
+        return scene.has_mass() if family in ("tuned", CHOSEN) else super().serves(scene, family)
+
+    def settings_of(self, scene: Scene, family: str) -> Sequence[Setting]:
+        """Return the settings of a family; of `chosen` the first of the alternatives."""
+        if family == CHOSEN:
+            return [next(iter(ALTERNATIVES[0].ways.values()))]
+        return super().settings_of(scene, family)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
         found = []
@@ -127,7 +153,8 @@ class Exudyn(Linearising, Engine):
             elif setting.family == "tuned":
                 motion = extrapolate(exu, scene, times, step, _trapezoidal)
             else:
-                motion = integrate(exu, scene, times, step, DYNAMIC[setting.family])
+                configure = DYNAMIC.get(setting.family) or partial(_chosen, setting.options)
+                motion = integrate(exu, scene, times, step, configure)
         message = "; ".join([motion.message, *warnings] if motion.message else warnings)
         return self._trajectory(scene, setting, replace(motion, message=message))
 
@@ -205,6 +232,17 @@ def _alpha(exu: Any, settings: Any, singular: bool) -> Any:
     settings.timeIntegration.newton.absoluteTolerance = 1e-8
     settings.timeIntegration.generalizedAlpha.spectralRadius = SPECTRAL_RADIUS
     _plain(exu, settings, singular)
+    return exu.DynamicSolverType.GeneralizedAlpha
+
+
+def _chosen(options: Mapping[str, Any], exu: Any, settings: Any, singular: bool) -> Any:
+    """Configure the linear solver and the index that the options name."""
+    kind = _trapezoidal(exu, settings, singular)
+    settings.linearSolver.solverType = getattr(exu.LinearSolverType, options["solver"])
+    settings.linearSolver.ignoreSingularJacobian = options["solver"] == "EigenDense"
+    if options["index"] == 2:
+        return kind
+    settings.timeIntegration.generalizedAlpha.spectralRadius = SPECTRAL_RADIUS
     return exu.DynamicSolverType.GeneralizedAlpha
 
 
