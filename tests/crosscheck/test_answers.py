@@ -72,6 +72,7 @@ def test_numbers_of_numpy_in_an_answer_become_floats_and_ints():
 
 
 def test_a_study_records_malformed_answers_as_crashed_and_goes_on(tmp_path: Path):
+    """VERSIONLESS raises the error "no licence" where its version is read; SCALARS are numbers of numpy."""
     wanted = [  # engine, its options, the outcome in its record
         ("MALFORMED", {"damage": "nothing"}, "CRASHED"),
         ("MALFORMED", {"damage": "few samples"}, "CRASHED"),

@@ -130,6 +130,7 @@ def test_a_faulty_scene_of_a_folder_of_records_is_refused(tmp_path):
 
 
 def test_runs_of_different_mechanisms_are_each_in_one_set_only():
+    """Records name their mechanism; one without a name is compared."""
     old, new = one(1e-5), one(1e-4)
     old["run"]["mechanism"], new["run"]["mechanism"] = "m1", "m2"
     first, second = changes(old, new)

@@ -129,6 +129,7 @@ def test_a_missing_spring_that_is_slack_at_the_start_is_found_along_the_run():
 
 @pytest.mark.parametrize(("part", "passes"), [(0.009, True), (0.011, False)])
 def test_accelerations_along_a_run_may_be_off_by_one_percent(part, passes):
+    """Accelerations of a run by Gauss's principle are larger by a part of them."""
     scene = arm()
     run = gauss_motion(scene, (0.0, 0.1))
     off = replace(

@@ -59,6 +59,7 @@ def test_changes_beyond_noise_are_named_by_kind(changed: dict[str, Any], kinds: 
 
 
 def test_bisection_finds_the_change_past_versions_that_cannot_be_installed():
+    """The change is in the 13th of 20 versions; log₂ 20 measurements, and some more for skipped ones."""
     known = [f"1.{k}" for k in range(20)]
 
     def measure(version: str) -> Measured:
@@ -76,6 +77,7 @@ def test_bisection_finds_the_change_past_versions_that_cannot_be_installed():
 
 @pytest.mark.slow
 def test_changed_gravity_default_and_lost_function_are_found_and_the_release_is_named(tmp_path: Path):
+    """1.1 has another default step, 1.2 gravity 1.5 times too large, 1.3 another name of a function."""
     STONE.save(tmp_path / "stone.toml")
     stone = str(tmp_path / "stone.toml")
     write_wheel(tmp_path, "1.0")

@@ -35,6 +35,7 @@ def test_accelerations_part_by_part_are_those_by_singular_values(seed: int):
 
 
 def test_large_mechanisms_start_closed_and_differ_in_parts_loops_and_redundancy():
+    """Gaps of joints and their rates are rounding; ranks of the parts of a Jacobian add up to its rank."""
     seen: dict[str, set[int]] = {"parts": set(), "loops": set(), "redundant": set()}
     for seed in SMALL:
         scene = large_graph(seed)

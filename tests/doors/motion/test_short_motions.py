@@ -22,6 +22,7 @@ def tolerance(steps: int) -> float:
 
 @pytest.mark.parametrize("name", MOTIONS)
 def test_motion_has_the_judges_states_to_rounding(name):
+    """The stored states are by the judge's references or closed forms."""
     scene = MOTIONS[name]()
     found = mbref.simulate(scene, "taylor", times=times_of(scene), rtol=1e-12)
     assert found.outcome.name == "COMPLETED", found.message

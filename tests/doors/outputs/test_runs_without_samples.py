@@ -67,7 +67,6 @@ def test_every_array_of_a_motion_without_samples_is_empty(stuck, tmp_path):
         stuck.mechanism.joint
     )
     assert stuck.joint("A").angle.shape == (0,) and len(stuck.to_dataframe()) == 0
-    assert "SINGULAR_MATRIX" in stuck._repr_html_()
 
 
 def test_motion_of_another_engine_without_samples_has_empty_columns_of_all_parts():

@@ -108,6 +108,7 @@ def test_angle_at_the_end_alone_is_the_angle_that_dense_samples_show(seed):
 
 
 def test_run_file_table_and_json_have_the_angle_with_its_full_turns(tmp_path, capsys):
+    """φ = 40 (1 - cos 2 t) rad at 3 s."""
     scene, path = wound_wheel(), tmp_path / "wound.toml"
     scene.save(path)
     expected = NATURAL * (1.0 - math.cos(2.0 * END))

@@ -101,6 +101,7 @@ def test_rod_between_two_ball_joints_is_named_as_spinning_idly_about_its_axis(tm
 
 
 def test_welded_halves_of_a_rod_between_two_ball_joints_are_named_together(tmp_path, capsys):
+    """The coupler is a rod of two halves, welded in its middle."""
     scene = ball_linkage()
     place = scene.body[1].position
     weld = {"name": "W", "type": "fixed", "bodies": ["coupler", "half"], "anchor": list(place)}

@@ -33,6 +33,7 @@ def with_slide(stiffness: float, damping: float, mass: float) -> Scene:
 
 
 def test_flat_parallelogram_is_an_equilibrium_at_a_singular_position_and_has_no_modes(tmp_path, capsys):
+    """Gravity acts along the line of all links."""
     flat = parallelogram(0.0, 1.0).with_(gravity=(G, 0.0, 0.0))
     found = equilibria(flat, starts=2)
     assert found[0].stability == "singular" and len(found[0].eigenvalues) == 0
