@@ -6,6 +6,7 @@ with crosscheck's own dependencies not newer than here. crosscheck itself is on 
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -22,6 +23,8 @@ from crosscheck.engines.shared.file_cache import cache, hashed
 PRODUCT = Path(__file__).parents[2]
 REQUIREMENT = re.compile(r"([A-Za-z0-9][A-Za-z0-9._-]*)==([A-Za-z0-9][A-Za-z0-9.+!_-]*)")
 NAME = re.compile(r"[A-Za-z0-9._-]+")
+PACKAGES = ("site-packages", "dist-packages")  # names of folders of installed packages
+ELSEWHERE = ("PIP_TARGET", "PIP_PREFIX", "PIP_ROOT", "PIP_USER")  # settings that install elsewhere
 RETRIES = 1  # of pip's connections: without a network each one takes seconds
 UNREACHED = ("Retrying (", "ConnectionError", "NewConnectionError", "name resolution")  # words of pip
 REASONS = 3  # largest number of pip's lines in a message
@@ -78,8 +81,9 @@ def _fill(place: Path, wanted: Requirement, pins: Sequence[str]) -> None:
     constraints.write_text("\n".join(pins))
     _pip("--python", _python(place), "install", "--constraint", constraints, str(wanted))
     (packages,) = place.glob("lib/python*/site-packages")
+    here = [path for path in sys.path if Path(path).name in PACKAGES]
     # .pth files are read in the order of their names: packages' own ones come first
-    (packages / "zz_crosscheck.pth").write_text("\n".join([str(PRODUCT), *filter(None, sys.path)]))
+    (packages / "zz_crosscheck.pth").write_text("\n".join([str(PRODUCT), *here]))
 
 
 def _pins() -> list[str]:
@@ -103,7 +107,10 @@ def _pip(*words: str | Path) -> str:
     """Return the text that pip prints; raises NotInstalled with the cause of a failure."""
     fixed = ("--disable-pip-version-check", "--no-input", f"--retries={RETRIES}")
     command = [sys.executable, "-m", "pip", *fixed, *map(str, words)]
-    done = subprocess.run(command, check=False, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    own = {name: value for name, value in os.environ.items() if name not in ELSEWHERE}
+    done = subprocess.run(
+        command, check=False, capture_output=True, text=True, stdin=subprocess.DEVNULL, env=own
+    )
     if done.returncode:
         raise NotInstalled(f"{words[-1]}: {_cause(done.stdout + done.stderr)}")
     return done.stdout

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -58,7 +59,10 @@ def _document(python: Path, command: Command, say: Say) -> tuple[Any, str]:
     """
     words = [str(python), "-m", "crosscheck.processes.program", *command]
     pipe, said = subprocess.PIPE, list[str]()
-    with subprocess.Popen(words, stdin=pipe, stdout=pipe, stderr=pipe, text=True, process_group=0) as started:
+    own = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}  # it would come first
+    with subprocess.Popen(
+        words, stdin=pipe, stdout=pipe, stderr=pipe, text=True, process_group=0, env=own
+    ) as started:
         assert started.stdout is not None and started.stderr is not None
         reader = threading.Thread(target=_read, args=(started.stderr, said, say), daemon=True)
         reader.start()
