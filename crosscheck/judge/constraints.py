@@ -204,7 +204,8 @@ def _initial_twists(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     j, b = jacobian(scene, 0.0, *pose)
     j = j * scale
     if given.all() and _holds(j, wanted, b):
-        return tuple(np.hsplit((wanted * scale).reshape(-1, 6), 2))
+        velocity, angular_velocity = np.hsplit((wanted * scale).reshape(-1, 6), 2)
+        return velocity, angular_velocity
     x, free = _solve(j, b)
     _refuse(scene, "drivers contradict it", j @ x - b, x, CONTRADICTED)
     step, still_free = _solve(free[given], wanted - x[given])

@@ -154,7 +154,7 @@ class _Drawing:
         factors = [(part, factored(rows[np.ix_(part.rows, part.columns)])) for part in parts(rows)]
         if min(held.clearance for _, held in factors) < CLEAR:
             return None
-        twists = rng.normal(size=rows.shape[1])
+        twists = np.asarray(rng.normal(size=rows.shape[1]))
         for part, held in factors:
             twists[part.columns] -= held.basis @ (held.basis.T @ twists[part.columns])
         moving = _with_twists(still, twists.reshape(-1, 6))
