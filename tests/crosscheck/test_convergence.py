@@ -10,6 +10,9 @@ from crosscheck.convergence.ladders import MECHANISMS, ROWS, VAIN, climb, in_vai
 from crosscheck.convergence.orders import cell, order
 from crosscheck.study.grid import Case
 
+TUNED_MUJOCO = next(row for row in ROWS if (row.engine, row.family) == ("mujoco", "tuned"))
+BENNETT = next(mechanism for mechanism in MECHANISMS if mechanism.scene == "bennett")
+
 
 def run(step: float, error: float, seconds: float = 0.1, outcome: str = "COMPLETED", **changes) -> dict:
     record = {
@@ -67,17 +70,15 @@ def test_runs_count_as_vain_while_none_lowers_the_least_error() -> None:
 
 def test_steps_of_a_ladder_are_halved_and_divide_the_interval_of_samples() -> None:
     """Samples are a tenth of the motion apart."""
-    row = next(row for row in ROWS if (row.engine, row.family) == ("mujoco", "tuned"))
-    cases = ladder(row, MECHANISMS[5])
+    cases = ladder(TUNED_MUJOCO, BENNETT)
     steps = [case.setting.options["step"] for case in cases]
     assert all(a == 2 * b for a, b in pairwise(steps)) and len(steps) > 10
-    assert (MECHANISMS[5].end / 10) / steps[0] == round((MECHANISMS[5].end / 10) / steps[0])
+    assert (BENNETT.end / 10 / steps[0]).is_integer()
 
 
 def test_a_ladder_ends_where_finer_runs_are_vain_or_would_take_too_long() -> None:
     """Errors 1e4 h⁴ + 1e-10 reach their floor; runs of 1.5 s would take 3 s at half the step."""
-    row = next(row for row in ROWS if (row.engine, row.family) == ("mujoco", "tuned"))
-    cases = ladder(row, MECHANISMS[5])
+    cases = ladder(TUNED_MUJOCO, BENNETT)
 
     def fourth(case: Case) -> dict:
         h = case.setting.options["step"]

@@ -84,20 +84,9 @@ def test_command_refuses_a_file_for_results_that_holds_none_or_cannot_be_written
 ):
     monkeypatch.chdir(tmp_path)
     Path("letter.txt").write_text("my only copy")
-    few = [
-        "--vary",
-        "gravity[1]=0:1",
-        "--count",
-        "2",
-        "--workers",
-        "1",
-        "--samples",
-        "2",
-        "--duration",
-        "1e-3",
-    ]
+    few = "--vary gravity[1]=0:1 --count 2 --workers 1 --samples 2 --duration 1e-3"
     try:
-        status = main(["ensemble", "four_bar", *few, "--out", out])
+        status = main(["ensemble", "four_bar", *few.split(), "--out", out])
     except SystemExit as refused:
         status = refused.code
     error = capsys.readouterr().err

@@ -275,12 +275,15 @@ def test_angle_beyond_a_turn_is_a_probable_slip_of_degrees():
     assert probable_slips(scene.with_("load[0].natural_angle", -69.0)) == [
         "load[0].natural_angle: -69 rad is more than a turn; is it in degrees?"
     ]
-    driven = find_scene("four_bar")
-    for phase, told in ((180.0, 1), (-180.0, 1), (6.2, 0), (-6.2, 0)):
-        sine = {"amplitude": 1.0, "frequency": 2.0, "phase": phase}
-        start = -math.sin(phase)
-        slips = probable_slips(driven.with_(driver=({"joint": "A", "polynomial": [start], "sine": sine},)))
-        assert len(slips) == told and all(s.startswith("driver[A].sine.phase: ") for s in slips), slips
+
+
+@pytest.mark.parametrize(("phase", "told"), [(180.0, 1), (-180.0, 1), (6.2, 0), (-6.2, 0)])
+def test_phase_beyond_a_turn_is_a_probable_slip_of_degrees(phase, told):
+    """The driver's polynomial −sin(phase) lets its angle begin at 0."""
+    sine = {"amplitude": 1.0, "frequency": 2.0, "phase": phase}
+    driver = {"joint": "A", "polynomial": [-math.sin(phase)], "sine": sine}
+    slips = probable_slips(find_scene("four_bar").with_(driver=(driver,)))
+    assert [slip.split(": ")[0] for slip in slips] == ["driver[A].sine.phase"] * told
 
 
 @pytest.mark.parametrize(("rate", "told"), [(720.0, 1), (-90.0, 1), (124.8, 0), (6.0, 0), (0.0, 0)])
@@ -326,15 +329,27 @@ def test_command_draw_writes_svg_and_png_and_refuses_other_endings(my_toml, caps
 
 
 def test_command_assemble_gives_a_link_its_length_and_diagnose_states_it(my_toml, capsys):
+    """A link from A to B of 0.2 m becomes 0.25 m long along x: joint B moves by 0.05 m."""
     assert main(["assemble", "my.toml", "--length", "A-B=0.25", "--out", "closed.toml"]) == 0
     out = capsys.readouterr().out
     assert "length A–B: 0.2 m, now 0.25 m" in out and "joint B: moved by 0.05 m" in out, out
     assert Scene.from_file("closed.toml").joint_named("B").anchor == pytest.approx((0.25, 0, 0))
-    assert main(["assemble", "my.toml", "--length", "A-B=-1"]) == 2
     assert main(["diagnose", "closed.toml", "--start", "--json"]) == 0
     found = json.loads(capsys.readouterr().out.splitlines()[-1])
-    assert found["redundant"] == 3 and found["links"]["crank"] == {"A–B": pytest.approx(0.25)}
-    assert {"B": "inline"} in found["exchanges"] and found["along_motion"] is None
+    assert found["links"]["crank"] == {"A–B": pytest.approx(0.25)}
+
+
+def test_command_diagnose_names_an_exchange_that_frees_redundant_constraints(my_toml, capsys):
+    """The template, a planar slider-crank, moves by 1; 6·3 − 5·4 = −2, so that 3 constraints are redundant."""
+    assert main(["diagnose", my_toml, "--start", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert found["redundant"] == 3 and {"B": "inline"} in found["exchanges"]
+    assert found["along_motion"] is None, "only the start is diagnosed"
+
+
+def test_command_assemble_refuses_a_negative_length(my_toml, capsys):
+    assert main(["assemble", my_toml, "--length", "A-B=-1"]) == 2
+    assert "A-B=-1" in capsys.readouterr().err
 
 
 def pinned_four_bar() -> Scene:

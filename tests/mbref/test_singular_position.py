@@ -47,6 +47,7 @@ def first_crossing(scene: Scene, end: float) -> float:
 @pytest.mark.parametrize("method", WATCHING)
 @pytest.mark.parametrize("loop", LOOPS)
 def test_run_that_watches_the_rank_ends_at_the_first_singular_position(loop, method):
+    """The run ends within 0.2 % of the motion at the closed form's first singular time, uncrossed."""
     scene, end = LOOPS[loop]
     time = first_crossing(scene, end)
     run = simulate(scene, method, np.linspace(0.0, end, 41))
