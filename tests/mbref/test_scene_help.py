@@ -340,7 +340,7 @@ def test_command_assemble_gives_a_link_its_length_and_diagnose_states_it(my_toml
 
 
 def test_command_diagnose_names_an_exchange_that_frees_redundant_constraints(my_toml, capsys):
-    """The template, a planar slider-crank, moves by 1; 6·3 − 5·4 = −2, so that 3 constraints are redundant."""
+    """The template, a planar slider-crank, moves by 1, not by 6·3 − 5·4 = −2: 3 constraints are redundant."""
     assert main(["diagnose", my_toml, "--start", "--json"]) == 0
     found = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert found["redundant"] == 3 and {"B": "inline"} in found["exchanges"]
