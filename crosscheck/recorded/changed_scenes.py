@@ -150,7 +150,7 @@ def _scaled(scene: Scene, kind: str, part: Any, fields: tuple[str, ...], name: s
             return f"without the {name}"
         value = getattr(part, fields[0])
         if np.ndim(value) or kind == "body":
-            return f"{name} times {1 + x:.6g}"
+            return f"{name} times {1 + x:.5g}"
         return f"{name} of {(1 + x) * value:.6g}, not {value:.6g}"
 
     return Change(of, SMALL, says, None if kind == "body" else -1.0)
