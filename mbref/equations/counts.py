@@ -38,9 +38,8 @@ class Counts:
         Coordinates minus rank.
     """
 
-    coordinates: int  # six for each body
+    coordinates: int
     rows: int
-    # rows of drivers count under their joint, rows of a modelled ground under "ground"
     rows_by_joint: dict[str, int]
     rank: int
     redundant: int

@@ -27,7 +27,6 @@ import numba
 from numba import cfunc, f8, i8, njit, types, u4
 from numba.core.typing import Signature
 
-import mbref
 from mbref.kernels.disk_cache import (
     begin,
     cached_in,
@@ -66,7 +65,7 @@ WITH_KERNELS = (
 def _source_hash() -> str:
     digest = hashlib.sha256(numba.__version__.encode())
     for folder in WITH_KERNELS:
-        for path in sorted((Path(mbref.__file__).parent / folder).rglob("*.py")):
+        for path in sorted((Path(__file__).parents[1] / folder).rglob("*.py")):
             digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 

@@ -1,9 +1,9 @@
 """Steps of a Taylor method, each judged at its end, and kernels that take many steps in one call.
 
-At the end of a step the rows are
-violated by the error of the series, which is corrected, and the accelerations of the equations differ from
-the series.  If either exceeds what the tolerance explains, or rows have become dependent, the step is
-repeated with a smaller length. So only a series that continues across a singular position crosses it.
+At the end of a step the rows are violated by the error of the series, which is corrected, and the
+accelerations of the equations differ from the series.  If either exceeds what the tolerance explains, or rows
+have become dependent, the step is repeated with a smaller length. So only a series that continues across a
+singular position crosses it.
 """
 
 from __future__ import annotations
@@ -22,9 +22,7 @@ from mbref.taylor.crossing.location import count_crossings
 from mbref.taylor.crossing.rounding_pole import remove_pole, time_of_pole
 from mbref.taylor.crossing.start import is_turned
 from mbref.taylor.crossing.steps_across import cross_briefly, is_full, switches_branch
-from mbref.taylor.crossing.thresholds import (
-    MIN_GAIN,
-)
+from mbref.taylor.crossing.thresholds import MIN_GAIN
 from mbref.taylor.layout import BEGIN, EXPAND, SAVE_SERIES, SERIES, TAKE_STEP
 from mbref.taylor.loads import expand_functions, part_behind_no_length
 from mbref.taylor.mode import is_accurate
