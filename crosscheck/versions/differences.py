@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from crosscheck.conformance.suite import FAIL, PASS
 from crosscheck.judge.metrics import at_samples, error_series, in_scene_order
 from crosscheck.judge.start_accelerations import starts
 from crosscheck.setting import ORIGIN
@@ -24,6 +25,7 @@ NOISE = 1e-6
 # rounding decides how motions go on that are wrong by so much (of the mechanism's length, or rad)
 SHARE, LOST = 0.1, 0.1
 NEAR_LIMIT = 0.1  # of the allowed value: smaller measured values of a check are not compared
+SAME_VERDICT = tuple(f"{status}:" for status in (PASS, FAIL))  # beginnings of changes of a measured value
 RESULTS = ("run", "outcome", "accelerations", "motion", "error", "check")
 
 
@@ -41,14 +43,14 @@ class Found(NamedTuple):
 
 
 def between(old: Measured, new: Measured, scenes: Sequence[Scene]) -> list[Found]:
-    """Return the changes from one version to another, the results first."""
+    """Return the changes from one version to another: results, and among them other verdicts, first."""
     found = [Found("run", "", f"only {new.requirement}: {text}") for text in new.faults if not old.faults]
     found += [Found("run", "", f"only {old.requirement}: {text}") for text in old.faults if not new.faults]
     for before, after in zip(old.documents, new.documents, strict=True):
         if before is not None and after is not None:
             found += _of_documents(before, after, {scene.name: scene for scene in scenes})
     found += _of_facts(old.facts, new.facts)
-    return sorted(found, key=lambda one: not one.is_result)
+    return sorted(found, key=lambda one: (not one.is_result, one.change.startswith(SAME_VERDICT)))
 
 
 def _of_documents(before: Any, after: Any, scenes: Mapping[str, Scene]) -> Iterator[Found]:

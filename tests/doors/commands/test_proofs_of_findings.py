@@ -34,6 +34,7 @@ def proof(script: str) -> Finding:
     [
         ("print('error', 2.5)", Status.PRESENT, ""),
         ("print(0.5)", Status.GONE, ""),
+        ("print(float('nan'))", Status.PRESENT, "nan"),
         ("print('none')", Status.UNCLEAR, "the script gave no number: none"),
         ("raise ValueError('no such joint')", Status.UNCLEAR, "no such joint"),
         ("import os; os._exit(3)", Status.UNCLEAR, "ended with exit status 3"),
