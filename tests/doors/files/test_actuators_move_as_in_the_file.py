@@ -60,9 +60,10 @@ SERVOS = [
     "<general joint='JOINT' gainprm='7' biastype='affine' biasprm='0.3 -11 -0.2'/>",
     "<damper joint='JOINT' kv='2' ctrlrange='0 1'/>",
     "<intvelocity joint='JOINT' kp='6' actrange='-3 3'/>",
+    "<general joint='JOINT' dyntype='integrator' gainprm='5'/>",
     "<position joint='JOINT' kp='9' ctrllimited='true' ctrlrange='-0.1 0.1'/>",
 ]
-CONTROLS = [0.4, -0.7, 0.5, 1.2, -0.3, 0.8, 0.0, 0.9]
+CONTROLS = [0.4, -0.7, 0.5, 1.2, -0.3, 0.8, 0.0, 0.0, 0.9]
 
 
 def test_servos_of_a_keyframe_accelerate_their_joints_as_in_mujoco(files):
@@ -75,7 +76,7 @@ def test_servos_of_a_keyframe_accelerate_their_joints_as_in_mujoco(files):
         qpos = " ".join(map(str, random.uniform(-4, 4, len(SERVOS))))
         qvel = " ".join(map(str, random.uniform(-2, 2, len(SERVOS))))
         ctrl = " ".join(map(str, CONTROLS))
-        text = model_of(SERVOS, f"name='{name}' qpos='{qpos}' qvel='{qvel}' ctrl='{ctrl}' act='0.6'")
+        text = model_of(SERVOS, f"name='{name}' qpos='{qpos}' qvel='{qvel}' ctrl='{ctrl}' act='0.6 0.7'")
         scene, out = files.scene(text, "servos.xml", "--keyframe", name or "1")
         theirs = accelerations(text, 1)
         assert "actuator" not in out, "every actuator is in the scene"
@@ -83,14 +84,12 @@ def test_servos_of_a_keyframe_accelerate_their_joints_as_in_mujoco(files):
 
 
 def test_servos_without_a_keyframe_accelerate_their_joints_as_in_mujoco(files):
-    """Without a keyframe all controls are 0: position servos hold 0, and motor and damper give no force.
-
-    MuJoCo's qacc at the reference pose is the truth; the import reports motor and damper as left out.
-    """
-    text = model_of(SERVOS)  # one motor, one damper, and six servos
+    """Without controls position servos hold 0; the import leaves out motor, damper and integrator, which give
+    no force. MuJoCo's qacc at the reference pose is the truth."""
+    text = model_of(SERVOS)  # one motor, damper and integrator, and six servos
     scene, out = files.scene(text, "servos.xml")
     theirs = accelerations(text, -1)
-    assert "left out: 2 actuators without a control value: no force" in out
+    assert "left out: 3 actuators without a control value: no force" in out
     assert of_scene(scene) == pytest.approx(theirs, abs=ROUNDED * np.abs(theirs).max())
 
 
