@@ -291,9 +291,10 @@ def accept(t, y, memory):
 
 
 @kernel
-def copy(order, copied):
+def copy_order(order, target):
+    """Copy an order of rows or columns."""
     for i in range(order.shape[0]):
-        copied[i] = order[i]
+        target[i] = order[i]
 
 
 @kernel
@@ -302,16 +303,16 @@ def replace_partition(memory):
     scratch = scratch_of(memory.chart)
     partition, pivot = scratch.partition, scratch.partition.pivot
     rank = partition.rank
-    copy(scratch.row_order, scratch.last_row_order)
-    copy(scratch.column_order, scratch.last_column_order)
+    copy_order(scratch.row_order, scratch.last_row_order)
+    copy_order(scratch.column_order, scratch.last_column_order)
     choose_coordinates(memory)
     if partition.rank != rank:
         return True
     factorise_dependent(memory)
     if pivot < partition.pivot:
         return True
-    copy(scratch.last_row_order, scratch.row_order)
-    copy(scratch.last_column_order, scratch.column_order)
+    copy_order(scratch.last_row_order, scratch.row_order)
+    copy_order(scratch.last_column_order, scratch.column_order)
     partition.pivot = partition.largest_pivot = pivot
     return False
 
