@@ -12,7 +12,8 @@ from mbref.design.linearisation import Tangent
 from mbref.design.winding import angle_derivatives
 
 TURN_STEP = 0.15  # rad; turn of a spring between neighbouring poses
-MOST_POSES = 3000  # largest number of such poses in a search, about 70 turns
+MOST_POSES = 2400  # largest number of poses in a search; 1 / f² of it with f freedoms, which cost more
+POSES_OF_NEWTON = 30  # poses that cost as much as an equilibrium by Newton's method
 LEAST_PROGRESS = 0.1  # turn / TURN_STEP below which a joint is taken to be at a limit of its motion
 NEIGHBOURS = 4 * TURN_STEP  # distance, rad or lengths, of two equilibria between which a third one is sought
 SOFT = 4.0  # moment of a spring at half a turn / moment of all forces on its joint, below which it is turned
@@ -23,7 +24,7 @@ class Windings:
 
     def __init__(self, found: list[Newton], freedoms: int, are_one: Callable[[Newton, Newton], bool]):
         self.found, self.freedoms, self.are_one = found, freedoms, are_one
-        self.left, self.turned = MOST_POSES, set[tuple[int, int]]()
+        self.left, self.turned = MOST_POSES // max(1, freedoms) ** 2, set[tuple[int, int]]()
 
     def search(self) -> None:
         """Add the equilibria that are met where each soft spring is turned both ways from each equilibrium.
@@ -41,6 +42,7 @@ class Windings:
         """Add the equilibria on one way from an equilibrium."""
         last = here
         for start in self._starts(here.tangent, spring, way):
+            self.left -= POSES_OF_NEWTON
             settled = balanced(start, self.freedoms)
             if settled is None:
                 continue
