@@ -25,6 +25,7 @@ from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import ACCEPT, CHANGED, ENTER, NOT_CONVERGED, OK, RATES, SINGULAR_AHEAD
 from mbref.kernels.named_memory import Indices, Matrix, Vector, opener
 from mbref.linear_algebra.elimination import full_pivot, lu_factor, lu_solve
+from mbref.linear_algebra.vectors import copy
 from mbref.stabilisation.base import Stabilisation
 from mbref.stabilisation.projection import STUCK
 
@@ -291,28 +292,21 @@ def accept(t, y, memory):
 
 
 @kernel
-def copy_order(order, target):
-    """Copy an order of rows or columns."""
-    for i in range(order.shape[0]):
-        target[i] = order[i]
-
-
-@kernel
 def replace_partition(memory):
     """Choose the partition at ``memory.state``; return False and keep the last one if it is as good."""
     scratch = scratch_of(memory.chart)
     partition, pivot = scratch.partition, scratch.partition.pivot
     rank = partition.rank
-    copy_order(scratch.row_order, scratch.last_row_order)
-    copy_order(scratch.column_order, scratch.last_column_order)
+    copy(scratch.row_order, scratch.last_row_order)
+    copy(scratch.column_order, scratch.last_column_order)
     choose_coordinates(memory)
     if partition.rank != rank:
         return True
     factorise_dependent(memory)
     if pivot < partition.pivot:
         return True
-    copy_order(scratch.last_row_order, scratch.row_order)
-    copy_order(scratch.last_column_order, scratch.column_order)
+    copy(scratch.last_row_order, scratch.row_order)
+    copy(scratch.last_column_order, scratch.column_order)
     partition.pivot = partition.largest_pivot = pivot
     return False
 
