@@ -239,6 +239,7 @@ def test_roll_pitch_and_yaw_of_a_loop_turn_its_axis(tmp_path):
 
 
 def test_import_writes_a_scene_that_export_writes_as_mjcf(tmp_path, capsys):
+    """The model has a spring of 40 N/m, which the scene has, and two motors, which are left out."""
     assert main(["import", str(MODELS / "five_bar.xml"), "--out", str(tmp_path / "five.toml")]) == 0
     assert "left out: 2 actuators" in capsys.readouterr().out
     assert Scene.from_file(tmp_path / "five.toml").load[0].stiffness == 40

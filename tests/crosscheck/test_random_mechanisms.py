@@ -56,6 +56,7 @@ def test_engines_accelerate_six_random_mechanisms_as_mbref():
 
 @pytest.mark.slow
 def test_engines_accelerate_many_random_mechanisms_as_mbref():
+    """Initial accelerations, also by Gauss's principle."""
     assert excess(MANY) <= 1
 
 

@@ -102,7 +102,8 @@ def test_tree_formulation_crosses_singular_positions_on_the_smooth_branch(name):
 
 
 def test_tree_formulation_crosses_the_dead_positions_of_equal_crank_and_rod():
-    """Picard's iteration converges on no panel across these positions; the truth is the closed form."""
+    """Picard's iteration converges on no panel across these positions; the truth is the closed form, whose
+    crank is upright at 0.061192 s and 0.120704 s."""
     scene, times = SCENES["planar_slider_crank_equal"](), np.linspace(0.0, 0.14, 8)
     motion, exact = tree_motion(scene, times, EXTENDED, seconds=SECONDS), closed_form(scene).poses(times)
     assert not motion.reason

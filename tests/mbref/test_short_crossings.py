@@ -32,7 +32,7 @@ def test_motion_of_one_freedom_passes_all_its_singular_positions_on_the_smooth_b
     assert len(run.crossings) == crossings
 
 
-def test_parallelogram_beside_a_free_pendulum_crosses_as_its_closed_form():
+def test_parallelogram_moves_by_its_closed_form_through_three_crossings_beside_a_free_pendulum():
     """With the pendulum the scene has two degrees of freedom."""
     scene, times = four_bar_gravity(), np.linspace(0.0, 1.0, 9)
     run = simulate(with_pendulum(scene), "taylor", times, Limits(rtol=1e-9))

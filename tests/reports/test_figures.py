@@ -86,7 +86,6 @@ def test_powers_of_ten_are_plain_text():
     axes.set(xscale="log", yscale="log")
     labels = re.findall(r">([^<>\n]+)</text>", figures.svg(picture, "powers"))
     assert {"10⁻⁷", "10⁰", "2×10⁰", "3×10⁰"} <= set(labels), labels
-    assert len(figures.png(picture)) > 1000
 
 
 def test_title_with_dollar_signs_is_shown_as_it_is():

@@ -27,11 +27,12 @@ def test_committed_page_follows_from_the_stored_records(page):
 
 
 def test_links_within_a_page_lead_to_its_headings_and_folded_runs(page):
-    _, made = page
+    """The pages on small motions and on support have no such links."""
+    name, made = page
     headings = {text.lower().replace(" ", "-") for text in re.findall(r"^## (.+)$", made, re.M)}
     places = headings | set(re.findall(r' id="(.+?)"', made))
     links = set(re.findall(r"\]\(#(.+?)\)", made))
-    assert links <= places, links - places
+    assert links <= places and (links or name in ("small-motions", "support")), links - places
 
 
 def test_every_page_folds_some_of_its_text(page):

@@ -31,8 +31,9 @@ def test_import_of_a_file_that_mujoco_warns_about_leaves_no_log(text, status, tm
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", ["four_bar", "four_bar_gravity"])
 def test_runs_and_modes_of_engines_leave_no_file(scene, tmp_path, monkeypatch):
+    """The commands are not refused (2); Exudyn's defaults end early on these scenes (1)."""
     monkeypatch.chdir(tmp_path)
     engines = [word for name in ("mbref", "mujoco", "pinocchio", "exudyn") for word in ("--engine", name)]
-    crosscheck(["run", scene, *engines, "--samples", "3", "--duration", "0.01"])
-    crosscheck(["modes", "planar_slider_crank_gravity", *engines[2:]])
+    assert crosscheck(["run", scene, *engines, "--samples", "3", "--duration", "0.01"]) == 1
+    assert crosscheck(["modes", "planar_slider_crank_gravity", *engines[2:]]) < 2
     assert not os.listdir(tmp_path)

@@ -140,7 +140,8 @@ def test_angle_of_each_scene_of_a_batch_counts_its_full_turns():
 
 
 def test_angle_of_an_engine_without_turns_is_nan_where_its_samples_are_too_far_apart():
-    """Poses and rates at 5 ms determine the turns between them; those at 0, 0.7 and 3 s do not."""
+    """Poses and rates at 5 ms determine the turns between them; those at 0, 0.7 and 3 s do not.
+    The energy has that of the spring, so it is not known there either."""
     motion = mbref.simulate(wound_wheel(), times=TIMES)
     dense = mbref.Motion.of(motion.mechanism, replace(motion, angles=None))
     assert dense.joint("H").angle == pytest.approx(motion.joint("H").angle, abs=1e-9)

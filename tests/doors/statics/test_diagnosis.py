@@ -54,6 +54,7 @@ def test_rows_redundancy_and_freedoms_are_those_that_the_judge_finds_at_every_si
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8, 220))
 def test_rows_redundancy_and_freedoms_of_many_mechanisms_are_those_that_the_judge_finds(seed):
+    """The same scene in another unit of length has the same diagnosis."""
     scene = random_mechanism(seed)
     counts = diagnose(scene).counts
     assert (counts.rows, counts.redundant, counts.degrees_of_freedom) == tuple(mobility(scene))
