@@ -79,15 +79,15 @@ def alternatives_agree(bench: Bench) -> Finding | Outside:
 
 
 def _ways(bench: Bench, given: Alternatives, failures: dict[str, str]) -> dict[str, Way]:
-    """Return the completed ways; ways that fail and say so are left out. Raises Broken for a way that claims
-    to have completed with numbers that are not finite."""
+    """Return the completed ways; ways that fail and say so are left out. Raises Broken for a way that
+    crashes, or claims to have completed with numbers that are not finite."""
     scene = bench.scene
     times = np.array([0.0, min(scene.duration, max(SHORTEST, SHARE * scene.duration))])
     settings = {n: s for n, s in given.ways.items() if not bench.runner.refuses(scene, s.family)}
     runs = bench.runner.in_turn([(scene, setting) for setting in settings.values()], times)
     found = {}
     for name, run in zip(settings, runs, strict=True):
-        if run.outcome is Outcome.COMPLETED:
+        if run.outcome in (Outcome.COMPLETED, Outcome.CRASHED):
             whole = completed(scene, run, len(times))
             found[name] = Way(whole, _quantities(scene, whole))
         else:

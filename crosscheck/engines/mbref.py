@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, Owner, Setting, Supports
+from crosscheck.engine import Alternatives, Cannot, Engine, Owner, Setting, Supports
 from crosscheck.judge.tolerances import ROUNDING
 from crosscheck.refusals import FACTOR, TABLE
 from crosscheck.setting import BRANCHES, FamilyParts
@@ -51,6 +51,16 @@ OPTIONS = {
     "rtol": "relative tolerance of a step",
     BRANCHES: "pairs of a singular position and the branch to take there, from 1: [[2, 2]]",
 }
+# formulations without stabilisation: `serves` leaves out those that need independent rows or a regular mass
+# matrix. Penalties and squares of the rows' condition cost digits.
+FORMULATIONS = ("alf-dual", "mpi-qr", "mpi-gs", "mpi-svd", "lm1", "lm2", "alf")
+ALTERNATIVES = (
+    Alternatives(
+        {name: Setting(f"{name}+none", {"rtol": 1e-9}) for name in FORMULATIONS}
+        | {"taylor": Setting("taylor", {"rtol": 1e-9})},
+        1e-5,
+    ),
+)
 SECOND_RUN = "taylor"  # the method of the second runs by which errors are estimated
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-10, 1e-11)
 
@@ -61,7 +71,7 @@ class Mbref(Engine):
     name = "mbref"
     with_default = ("rtol",)
     package = "mbref"
-    families, options = FAMILIES, OPTIONS
+    families, options, alternatives = FAMILIES, OPTIONS, ALTERNATIVES
     supports = Supports(
         joints=tuple(JOINT_TYPES),
         drivers=get_args(Coordinate),
