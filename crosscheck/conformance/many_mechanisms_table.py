@@ -29,7 +29,7 @@ def tables(tally: Tally) -> Iterator[Table | Text]:
     yield table
     for v in tally.violations:
         numbers_of = "" if v["measured"] is None else f" {v['measured']:.3g}, allowed {v['allowed']:.3g}"
-        yield Text(f"fail: {v['scene']}, {v['check']}:{numbers_of} {v['reason']}".rstrip())
+        yield Text(f"fail: {v['scene']}, {v['card']}:{numbers_of} {v['reason']}".rstrip())
     yield Text(_summary(tally))
 
 

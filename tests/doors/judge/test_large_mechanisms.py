@@ -7,6 +7,8 @@ import pytest
 
 from crosscheck.conformance import suite
 from crosscheck.conformance.findings import fewer_bodies
+from crosscheck.conformance.many_mechanisms import Plan, Tally
+from crosscheck.conformance.many_mechanisms_table import tables
 from crosscheck.conformance.mechanisms.large_graphs import FEWEST, MOST, large_graph
 from crosscheck.conformance.mechanisms.specimens import Specimen
 from crosscheck.conformance.runners import InProcess
@@ -55,6 +57,13 @@ def test_reduction_drops_bodies_and_keeps_the_loops_that_a_violation_needs():
     small = fewer_bodies(large_graph(11), lambda scene: loops(scene) >= 3)
     assert len(small.body) <= 3 and loops(small) >= 3
     assert all(body.velocity is None for body in small.body)
+
+
+def test_violation_on_a_random_mechanism_is_printed_with_its_check_and_numbers():
+    tally, failed = Tally(Plan("mujoco", 1)), suite.Verdict("truth", "drawn_0", suite.FAIL, 0.5, 1e-3, "why")
+    tally.add({"version": "1.0", "verdicts": [suite.record_of(failed)]})
+    said = [str(block) for block in tables(tally)]
+    assert f"fail: drawn_0, {failed.check()}: 0.5, allowed 0.001 why" in said, said
 
 
 @pytest.mark.slow
