@@ -27,8 +27,8 @@ from tests.helpers.fake_engines import FAKES
 FAKE = f"{FAKES}:FAKE"
 COMMANDS = ("list", "run", "compare", "tune", "verify", "report", "paper", "diff", "certify")
 # fields of a record and of its cost (docs/records.md); the fake engine estimates no error
-FIELDS = ["engine", "version", "method", "settings", "outcome", "message", "t_end", "times", "bodies"]
-FIELDS += ["reactions", "metrics", "cost"]
+FIELDS = ["engine", "version", "method", "settings", "asked", "outcome", "message", "t_end", "times"]
+FIELDS += ["bodies", "reactions", "metrics", "cost"]
 COST = {"seconds", "build_seconds", "steps", "rejected", "rhs", "factorisations", "newton"}
 CERTIFY = ("certify", "four_bar_gravity", "--digits", "4", "--duration", "0.002", "--out")
 

@@ -65,9 +65,9 @@ def test_mujoco_s_integrators_converge_with_their_order(family: str, order: int)
 
 @pytest.mark.parametrize(("family", "evaluations"), [("stock", 4), ("euler", 1)])
 def test_mujoco_s_steps_divide_intervals_evenly_and_are_counted(family: str, evaluations: int) -> None:
-    """Steps of at most 0.15 s: 4 to 0.5 s and 2 more to 0.75 s; RK4 evaluates 4 times a step, Euler once."""
-    setting = Setting(family, {"step": 0.15})
-    cost = engine("mujoco").run(SCENES["heavy_top"](), np.array([0.0, 0.5, 0.75]), setting).cost
+    """Steps of at most 15 ms: 4 to 50 ms and 2 more to 75 ms; RK4 evaluates 4 times a step, Euler once."""
+    setting = Setting(family, {"step": 0.015})
+    cost = engine("mujoco").run(SCENES["heavy_top"](), np.array([0.0, 0.05, 0.075]), setting).cost
     assert (cost.steps, cost.rhs) == (6, 6 * evaluations)
 
 

@@ -57,6 +57,8 @@ COMMANDS = {
         ("paper", "--help"),
         ("diff", "report", "report"),
         ("certify", "--help"),
+        ("diagnose", "four_bar_gravity", "--engine", "mujoco"),
+        ("versions", "--help"),
     ],
 }
 RUNNER = """
