@@ -36,6 +36,7 @@ SQUARE = {
     "cylindrical": HINGE,
     "planar": HINGE,
 }
+LOADS = ("force", "moment", "spring", "torsion_spring")
 UNMET = 1e-8  # residual of the joints' rows, relative; 3e-11 in regular positions
 RANK = 1e-11  # pivots of redundant rows are rounding, 1e-15
 
@@ -52,8 +53,13 @@ class Spatial(Engine):
     def cannot(self, scene):
         if not scene.has_mass() or any(np.linalg.eigvalsh(i)[0] <= 0 for i in inertia_matrices(scene)):
             return Cannot(Owner.MODEL, "every body needs a mass and three moments of inertia")
-        unknown = [joint.type for joint in scene.joint if joint.type not in HELD]
-        return Cannot(Owner.ADAPTER, f"no {unknown[0]} joints") if unknown else None
+        unknown = [f"{joint.type} joints" for joint in scene.joint if joint.type not in HELD]
+        unknown += [f"{load.type} loads" for load in scene.load if load.type not in LOADS]
+        unknown += ["loads over time" for load in scene.load if load.over_time]
+        unknown += ["armatures" for joint in scene.joint if joint.reflected_inertia]
+        unknown += ["couplings"] * bool(scene.coupling)
+        unknown += ["drivers by a table" for driver in scene.driver if driver.table]
+        return Cannot(Owner.ADAPTER, f"no {unknown[0]}") if unknown else None
 
     def settings(self, scene):
         return [Setting("dop853", {"rtol": r}) for r in (1e-5, 1e-7, 1e-9)]

@@ -9,9 +9,11 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import mbref
 from tests.helpers.short_motions import MOTIONS
@@ -35,16 +37,16 @@ NAMES = (
 )
 FIELDS = ("position", "orientation", "velocity", "angular_velocity", "acceleration")
 PROGRAM = (
-    "import json\n"
+    "import json, sys\n"
     "from tests.doors.motion.test_kernels_in_plain_python import states\n"
-    "print(json.dumps(states()))"
+    "print(json.dumps(states(sys.argv[1:])))"
 )
 
 
-def states() -> dict[str, dict[str, list]]:
+def states(names: Sequence[str]) -> dict[str, dict[str, list]]:
     """Return the states of the motions by all methods after a tenth of their duration, and the outcomes."""
     found = {}
-    for name in NAMES:
+    for name in names:
         scene = MOTIONS[name]()
         for method in METHODS:
             run = mbref.simulate(scene, method, times=[0.1 * scene.duration], rtol=1e-5)
@@ -53,12 +55,15 @@ def states() -> dict[str, dict[str, list]]:
     return found
 
 
-def test_plain_and_compiled_kernels_agree_to_rounding():
+@pytest.mark.parametrize(
+    "names", [NAMES[::3], pytest.param(NAMES, marks=pytest.mark.slow)], ids=["few", "all"]
+)
+def test_plain_and_compiled_kernels_agree_to_rounding(names):
     """Numbers of steps are equal, and states to a hundred roundings a step: fused multiply-adds round
     otherwise."""
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM],
+        [sys.executable, "-c", PROGRAM, *names],
         cwd=ROOT,
         env=environment,
         capture_output=True,
@@ -66,7 +71,7 @@ def test_plain_and_compiled_kernels_agree_to_rounding():
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    plain, compiled = json.loads(done.stdout), states()
+    plain, compiled = json.loads(done.stdout), states(names)
     for run, expected in compiled.items():
         found = plain[run]
         assert (found["outcome"], found["steps"]) == ("COMPLETED", expected["steps"]), run
