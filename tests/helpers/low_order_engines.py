@@ -49,6 +49,10 @@ FAULTS = {  # faults of one line
         "moment[b] -= cross(spin[b], turn[b] @ self.inertia[b] @ turn[b].T @ spin[b])",
         "pass",
     ),
+    "armature is ignored": (
+        'unknown += ["armatures" for joint in scene.joint if joint.reflected_inertia]',
+        "pass",
+    ),
 }
 
 

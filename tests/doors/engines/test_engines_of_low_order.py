@@ -19,7 +19,9 @@ SHOWN_ON = {  # a scene of the suite on which each fault shows
     "a moment acts twice": "moment load",
     "a spring has half its stiffness": "several springs",
     "gyroscopic moments are forgotten": "tumbling body",
+    "armature is ignored": "armature pendulum",
 }
+RUNS = sorted(set(SHOWN_ON.values()) - {"armature pendulum"})  # the engine without a fault refuses armatures
 
 
 def failures(step: Step, scenes: list[str], fault: str = "") -> list[str]:
@@ -34,7 +36,7 @@ def failures(step: Step, scenes: list[str], fault: str = "") -> list[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("step", [euler, symplectic_euler, midpoint])
-@pytest.mark.parametrize("scene", sorted(set(SHOWN_ON.values())))
+@pytest.mark.parametrize("scene", RUNS)
 def test_engine_of_low_order_with_right_equations_conforms(step: Step, scene: str):
     assert failures(step, [scene]) == []
 
@@ -54,5 +56,4 @@ def test_free_fall_of_low_order_conforms_and_with_twice_its_weight_it_fails(step
 
 @pytest.mark.parametrize("step", [symplectic_euler, midpoint])
 def test_engine_of_low_order_that_ignores_armature_does_not_conform(step: Step):
-    """The example engine knows no armature: it runs the scene with the armature as if it had none."""
-    assert failures(step, ["armature pendulum"])
+    assert failures(step, ["armature pendulum"], "armature is ignored")
