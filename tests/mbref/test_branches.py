@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from crosscheck.judge.metrics import measure
 from mbref.cli import main
 from mbref.design.along_motion import along_motion
 from mbref.equations.branches import ALONE, MULTIPLE, second_order
@@ -21,6 +20,9 @@ from mbref.scenes.planar_slider_crank import slider_crank
 from mbref.simulation.simulate import Limits, simulate
 
 RATE = 124.8  # rad/s, of the driven crank
+ROUNDING = 1e-12  # m, of poses of about 0.5 m after some steps of 1e-15
+SLOW = 1e-8  # rad/s, rounding of rates of about 100 rad/s, magnified at singular positions
+LOST = 1e-8  # J, of a motion with about 5 J and rtol 1e-9
 
 
 def test_flat_rhombus_lists_its_smooth_and_its_folding_branch():
@@ -29,12 +31,13 @@ def test_flat_rhombus_lists_its_smooth_and_its_folding_branch():
     first, second = simulate(four_bar(), "taylor", [0.05]).crossings
     assert first.sentence == ALONE and second.sentence == "2 branches" and second.taken == 1
     expected = np.array([[-RATE, 0.0, -RATE], [-RATE, -RATE, 0.0]])
-    assert np.abs(second.angular_velocity[:, :, 2] - expected).max() < 1e-9
-    assert np.abs(second.position[:, 1]).max() < 1e-12, "all bodies lie on the x axis there"
+    assert np.abs(second.angular_velocity[:, :, 2] - expected).max() < SLOW
+    assert np.abs(second.position[:, 1]).max() < ROUNDING, "all bodies lie on the x axis there"
 
 
 def test_flat_five_bar_has_one_branch_at_every_crossing():
-    """A second rocker keeps the coupler parallel to the ground, so that it cannot fold."""
+    """A second rocker keeps the coupler parallel to the ground, so that it cannot fold. In 0.05 s the crank
+    turns by 6.24 rad from π/2 and is flat at 0 and -π."""
     crossings = simulate(five_bar(), "taylor", [0.05]).crossings
     assert len(crossings) == 2 and {c.sentence for c in crossings} == {ALONE}
 
@@ -47,33 +50,34 @@ def test_folding_branch_of_a_driven_rhombus_lays_the_coupler_on_the_crank():
     fold = simulate(four_bar(), "taylor", times, Limits(branches={2: 2}))
     assert fold.outcome.label == "COMPLETED" and [c.taken for c in fold.crossings] == [1, 2]
     behind = times > fold.crossings[1].time
-    assert np.abs(fold.position[~behind] - smooth.position[~behind]).max() < 1e-13
+    assert np.abs(fold.position[~behind] - smooth.position[~behind]).max() < ROUNDING
     angle = math.pi / 2 - RATE * times[behind]
     tip = 0.25 * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
-    assert np.abs(fold["crank"].position[behind] - tip).max() < 1e-12
-    assert np.abs(fold["coupler"].position[behind] - tip).max() < 1e-12
-    assert np.abs(fold["rocker"].angular_velocity[behind]).max() < 1e-8
-    assert measure(four_bar(), fold, None)["violation_position"] < 1e-12
+    assert np.abs(fold["crank"].position[behind] - tip).max() < ROUNDING
+    assert np.abs(fold["coupler"].position[behind] - tip).max() < ROUNDING
+    assert np.abs(fold["rocker"].angular_velocity[behind]).max() < SLOW
 
 
 def test_second_branch_of_a_swinging_rhombus_keeps_the_energy_and_leaves_the_smooth_motion():
-    """Up to the crossing the poses are those of the smooth branch, and more than 1 mm off after it."""
+    """Gravity and rigid joints lose no energy. Up to the crossing the poses are those of the smooth branch;
+    from the second sample after it they differ by more than 1 mm."""
     scene, times = four_bar_gravity(0.3), np.linspace(0.0, 1.0, 41)
     run = simulate(scene, "taylor", times, Limits(branches={1: 2}))
     assert run.outcome.label == "COMPLETED" and run.crossings[0].taken == 2
-    assert np.ptp(run.energy) < 1e-8
+    assert np.ptp(run.energy) < LOST
     off = np.abs(run.position - simulate(scene, "taylor", times).position).max(axis=(1, 2))
     behind = times > run.crossings[0].time
-    assert off[~behind].max() < 1e-9 and off[behind][1:].min() > 1e-3
+    assert off[~behind].max() < 1e-9 and off[behind][1:].min() > 1e-3  # m
 
 
 @pytest.mark.parametrize("loops", [2, 3])
-def test_chain_flat_in_all_loops_lists_the_branch_on_which_its_first_upright_rests(loops):
-    """All links lie on one line. On the smooth branch all uprights turn; the first loop alone may fold."""
+def test_chain_flat_in_all_loops_lists_the_smooth_branch_and_the_fold_of_its_first_loop(loops):
+    """All links lie on one line. On the smooth branch all uprights turn; where the first loop folds,
+    its first upright alone rests. The sentence says that there are further branches."""
     run = simulate(four_bar_chain(loops), "taylor", [1.0])
     (crossing,) = run.crossings
-    assert np.abs(crossing.position[:, 1]).max() < 1e-12 and crossing.sentence == "2 branches" + MULTIPLE
-    resting = np.abs(crossing.angular_velocity[:, : loops + 1, 2]) < 1e-6
+    assert np.abs(crossing.position[:, 1]).max() < ROUNDING and crossing.sentence == "2 branches" + MULTIPLE
+    resting = np.abs(crossing.angular_velocity[:, : loops + 1, 2]) < SLOW
     assert not resting[0].any() and resting[1].tolist() == [True] + [False] * loops
 
 
@@ -82,10 +86,10 @@ def test_second_branch_of_a_chain_folds_its_first_loop_and_keeps_the_energy(loop
     """In the folded loop the middles of bar and second upright coincide."""
     scene, times = four_bar_chain(loops), np.linspace(0.0, 1.0, 21)
     run = simulate(scene, "taylor", times, Limits(branches={1: 2}))
-    assert run.outcome.label == "COMPLETED" and np.ptp(run.energy) < 1e-8
+    assert run.outcome.label == "COMPLETED" and np.ptp(run.energy) < LOST
     behind = times > run.crossings[0].time
     folded = run["bar1"].position[behind] - run["upright1"].position[behind]
-    assert np.abs(folded).max() < 1e-9, "the first bar lies on the second upright"
+    assert behind.any() and np.abs(folded).max() < 1e-9, "m: the first bar lies on the second upright"
 
 
 def test_requests_for_a_branch_or_a_crossing_that_does_not_exist_are_refused():
@@ -97,13 +101,13 @@ def test_requests_for_a_branch_or_a_crossing_that_does_not_exist_are_refused():
         simulate(four_bar(), "taylor", [0.05], Limits(branches={9: 2}))
 
 
-def test_branches_are_refused_for_methods_that_do_not_cross():
+def test_request_for_a_branch_is_refused_for_a_method_that_does_not_cross_singular_positions():
     with pytest.raises(MethodError, match="does not cross singular positions; use taylor"):
         simulate(four_bar(), "mpi-svd+partitioning", [0.05], Limits(branches={2: 2}))
 
 
 @pytest.mark.parametrize("wrong", [{1: 0}, {1: "x"}, 3, [(1,)], {1: 1.5}], ids=str)
-def test_branches_that_are_no_pairs_of_whole_numbers_are_refused(wrong):
+def test_branches_that_are_not_positive_whole_numbers_are_refused(wrong):
     with pytest.raises(ValueError, match="branches: must be"):
         Limits(branches=wrong)
 
@@ -130,7 +134,7 @@ def test_command_names_the_option_that_asks_for_an_impossible_branch_or_code(wor
     assert said.startswith(message) and said.count("\n") == 1, said
 
 
-def test_record_file_keeps_the_crossings_of_a_run(tmp_path):
+def test_crossing_read_from_a_record_file_equals_the_saved_one(tmp_path):
     run = simulate(four_bar_gravity(0.3), "taylor", [0.5])
     run.save(tmp_path / "run.json")
     (read,) = Motion.load(tmp_path / "run.json").crossings
@@ -139,26 +143,30 @@ def test_record_file_keeps_the_crossings_of_a_run(tmp_path):
     assert np.array_equal(read.angular_velocity, crossing.angular_velocity)
 
 
-def test_crossings_are_none_if_not_looked_for_and_empty_if_none_is_passed():
+def test_crossings_are_none_by_a_method_that_does_not_detect_them_and_empty_if_none_is_passed():
+    """Partitioning detects none; a crank of 0.1 m and a rod of 0.3 m have no singular position."""
     assert simulate(four_bar_gravity(0.3), "mpi-svd+partitioning", [0.1]).crossings is None
     assert simulate(slider_crank(0.1, 0.3, 0.3, "crank"), "taylor", [0.1]).crossings == ()
 
 
-def test_open_reactions_count_redundant_rows_and_one_more_at_a_singular_position(tmp_path):
+def test_open_reactions_count_redundant_rows_and_one_more_at_a_singular_position():
     """The driven rhombus has one redundant row, in which all four joints take part: one open component each.
     At its flat position, the second sample, one more row depends on the others; 10 µs later none does."""
     flat = simulate(four_bar(), "taylor", [0.05]).crossings[0].time
     run = simulate(four_bar(), "taylor", [0.001, flat, flat + 1e-5])
     found = {part: tuple(row) for part, row in run.open_reactions.items()}
     assert found == {**dict.fromkeys("ABCD", (1, 2, 1)), "driver(A)": (0, 0, 0)}
-    run.save(tmp_path / "run.json")
+
+
+def test_counts_of_open_reactions_are_read_back_from_a_record_file(tmp_path):
+    """The driven rhombus has one redundant row in its four joints: a count of 1 at each sample."""
+    simulate(four_bar(), "taylor", [0.001, 0.002]).save(tmp_path / "run.json")
     read = Motion.load(tmp_path / "run.json")
-    assert np.array_equal(read.joint("A").open, [1, 2, 1]) and np.array_equal(
-        read.columns()["D.open"], [1, 2, 1]
-    )
+    assert read.joint("A").open.tolist() == read.columns()["D.open"].tolist() == [1, 1]
 
 
 def test_reactions_of_a_pendulum_have_no_open_component():
+    """Its pivot has three independent rows."""
     run = simulate("point_pendulum", "taylor", [0.1, 0.2])
     assert run.open_reactions and all(not row.any() for row in run.open_reactions.values())
 
@@ -190,15 +198,18 @@ def test_straight_arch_has_one_first_order_freedom_and_one_second_order_conditio
         assert found.kernel.shape[1] == freedoms and len(found.forms) == forms
 
 
-def test_diagnosis_lists_the_crossings_of_a_swinging_rhombus():
+def test_diagnosis_lists_the_three_crossings_of_a_swinging_rhombus():
+    """In its duration it swings three times through the flat position, where the coupler may fold."""
     found = along_motion(four_bar_gravity(0.3))
-    assert [c.sentence for c in found.crossings] == ["2 branches"] * 3 and not found.shaky
+    assert [c.sentence for c in found.crossings] == ["2 branches"] * 3
 
 
 def test_diagnosis_calls_a_straight_arch_shaky():
-    """The arch may begin to move and cannot move; a pendulum beside it moves."""
+    """Shaky: the constraints at first order allow a velocity of the arch, those at second order forbid it. A
+    pendulum beside it moves, so that there is a motion to diagnose; alone it is not shaky."""
     pendulum = Body(name="pendulum", mass=1.0, inertia=(0.1,) * 3, position=(3.5, 0.0, 0.0))
     hinge = Revolute(name="D", bodies=(GROUND, "pendulum"), anchor=(3.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
     arch = straight_arch()
     beside = arch.with_(body=(*arch.body, pendulum), joint=(*arch.joint, hinge), gravity=(0.0, -9.81, 0.0))
     assert along_motion(beside).shaky
+    assert not along_motion(beside.with_(body=(pendulum,), joint=(hinge,))).shaky

@@ -71,6 +71,7 @@ def test_file_is_read_as_it_was_written_and_nothing_else_is_left(tmp_path: Path)
         lambda data: data[:40] + bytes([data[40] ^ 1]) + data[41:],
         lambda data: b"something else",
     ],
+    ids=["a byte less", "cut to 10 bytes", "empty", "a byte more", "a bit flipped", "other text"],
 )
 def test_damaged_file_is_reported_removed_and_not_read(damage, tmp_path: Path, capsys):
     path = tmp_path / "a"
@@ -153,23 +154,24 @@ def files_in(cache: Path, pattern: str) -> list[Path]:
 
 # each damage costs several new processes that compile
 DAMAGES = (
-    lambda data: data[: len(data) // 2],
-    pytest.param(lambda data: b"\0" * len(data), marks=pytest.mark.slow),
+    pytest.param(lambda data: data[: len(data) // 2], id="cut in half"),
+    pytest.param(lambda data: b"\0" * len(data), id="zeros", marks=pytest.mark.slow),
 )
 
 
 @pytest.mark.parametrize(
     ("script", "pattern", "says"),
     [
-        (SMALL_KERNEL, "*.nbc", "7.0\n"),
-        pytest.param(SMALL_KERNEL, "*.nbi", "7.0\n", marks=pytest.mark.slow),
-        (SCENE, "*.code", "True\n"),
+        pytest.param(SMALL_KERNEL, "*.nbc", "7.0\n", id="code of a kernel"),
+        pytest.param(SMALL_KERNEL, "*.nbi", "7.0\n", id="index of a kernel", marks=pytest.mark.slow),
+        pytest.param(SCENE, "*.code", "True\n", id="code of a scene"),
     ],
 )
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_damaged_machine_code_is_reported_compiled_again_and_stored(
     script, pattern, says, damage, tmp_path: Path
 ):
+    """Three processes: the first compiles, the second finds files damaged, the third finds them whole."""
     cache = tmp_path / "cache"
     assert ran(script, tmp_path, cache)[0] == says
     files = files_in(cache, pattern)
@@ -186,6 +188,7 @@ def test_damaged_machine_code_is_reported_compiled_again_and_stored(
 
 @pytest.mark.parametrize(("script", "says"), [(SMALL_KERNEL, "7.0\n"), (SCENE, "True\n")])
 def test_program_runs_without_a_writable_cache(script, says, tmp_path: Path):
+    """A file is in place of the cache's folder."""
     (tmp_path / "file").write_text("no folder")
     out, error = ran(script, tmp_path, tmp_path / "file")
     assert out == says and "cannot write to" in error and "Traceback" not in error, error
@@ -225,6 +228,7 @@ def test_second_run_of_a_scene_compiles_nothing():
 
 
 def test_second_run_of_a_scene_imports_neither_scipy_sparse_nor_scipy_integrate():
+    """The program prints which of both modules a new process has loaded after its run."""
     simulate("four_bar_gravity", times=[0.01])  # writes the caches
     code = "import sys, mbref; mbref.simulate('four_bar_gravity', times=[0.01])\n"
     code += "print(*{'scipy.' + name for name in ('sparse', 'integrate')} & set(sys.modules))"

@@ -22,14 +22,17 @@ def greedy(n):
 
 @pytest.mark.skipif(PLAIN, reason="without the JIT kernels are plain functions")
 def test_array_is_allocated_only_by_a_kernel_with_the_decorator_allocating():
+    """``total`` has this decorator; ``greedy`` has the decorator ``kernel``, and numba refuses to compile
+    it."""
     assert total(3) == 3.0
     with pytest.raises(numba.core.errors.NumbaError, match="of array passed into"):
         greedy(3)
 
 
 def test_every_kernel_that_a_series_calls_is_compiled_before_a_run():
-    """A missing kernel would compile while the clock of a run counts. The stepper prepares the kernel that
-    follows drivers."""
+    """A missing kernel would compile while the clock of a run counts. Called are the entries that the modules
+    of stepper and branches import, and CALLED by address. All are in the list that is prepared, except
+    ``follow_drivers``, which the stepper prepares if drivers prescribe the motion."""
     from mbref.taylor import stepper
     from mbref.taylor.crossing import branches
 

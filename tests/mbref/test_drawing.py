@@ -1,4 +1,4 @@
-"""Pictures: points of bodies / the poses of a trajectory; views; signs of every joint and load."""
+"""Pictures: names, bars and signs at their places; views; animations that follow the poses of a motion."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
+from mbref import rotations
 from mbref.motions.drawing.film import png
 from mbref.motions.drawing.labels import LETTER, LINE_HEIGHT
 from mbref.motions.drawing.marks import SIGNS
@@ -32,8 +33,6 @@ def turning():
     x, y = start.position[0, :, 0], start.position[0, :, 1]
     position = np.stack([c * x - s * y, s * x + c * y, 0 * s * x], axis=2)
     half = np.stack([np.cos(turn / 2), 0 * turn, 0 * turn, np.sin(turn / 2)], axis=1)
-    from mbref import rotations
-
     orientation = rotations.multiply(half[:, None], start.orientation)
     zeros = np.zeros_like(position)
     return scene, dataclasses.replace(
@@ -53,7 +52,7 @@ def test_picture_of_a_scene_names_every_body_and_joint(name):
 
 
 def labels(picture: str) -> dict[str, np.ndarray]:
-    """Middles (k, 2), px, of the names of joints and bodies in each frame."""
+    """Return the middles (k, 2), px, of the names of joints and bodies in each frame."""
     found = {}
     for group in ET.fromstring(picture).iter(f"{SVG}g"):
         text, motion = group.find(f"{SVG}text"), group.find(f"{SVG}animateTransform")
@@ -64,8 +63,8 @@ def labels(picture: str) -> dict[str, np.ndarray]:
     return found
 
 
-def covered(found: dict[str, np.ndarray]) -> list[tuple[str, str]]:
-    """Pairs of names of which one covers a part of the other in some frame."""
+def overlapping(found: dict[str, np.ndarray]) -> list[tuple[str, str]]:
+    """Return pairs of names of which one covers a part of the other in some frame."""
     pairs = []
     for (first, a), (second, b) in itertools.combinations(found.items(), 2):
         reach = np.array([LETTER * (len(first) + len(second)), 2 * LINE_HEIGHT]) / 2
@@ -77,11 +76,11 @@ def covered(found: dict[str, np.ndarray]) -> list[tuple[str, str]]:
 @pytest.mark.parametrize("name", SCENES)
 def test_names_in_a_picture_do_not_overlap(name):
     found = labels(still(SCENES[name]()))
-    assert len(found) > 1 and not covered(found)
+    assert len(found) > 1 and not overlapping(found)
 
 
 def bars(picture: str) -> list[np.ndarray]:
-    """Ends (2, 2), px, of the parts of bars."""
+    """Return the ends (2, 2), px, of the parts of bars: lines of a width of 6 px."""
     lines = [
         node for node in ET.fromstring(picture).iter(f"{SVG}polyline") if node.get("stroke-width") == "6"
     ]
@@ -90,7 +89,7 @@ def bars(picture: str) -> list[np.ndarray]:
 
 
 def crossed(middle: np.ndarray, half: np.ndarray, bar: np.ndarray) -> bool:
-    """Whether a bar runs through a box."""
+    """Return whether a bar runs through a box with a middle and half its sizes (px)."""
     along = bar[0] + np.linspace(0.0, 1.0, 500)[:, None] * (bar[1] - bar[0])
     return bool((np.abs(along - middle) < half).all(axis=1).any())
 
@@ -106,7 +105,7 @@ def test_names_of_bodies_stay_clear_of_bars(name):
 
 def test_names_in_an_animation_do_not_overlap_in_any_frame(turning):
     found = labels(moving(*turning))
-    assert len(found) == len(turning[0].body) + len(turning[0].joint) and not covered(found)
+    assert len(found) == len(turning[0].body) + len(turning[0].joint) and not overlapping(found)
 
 
 @pytest.mark.parametrize("gap", [0.001, 0.02, 0.05])
@@ -117,11 +116,12 @@ def test_names_of_joints_near_each_other_do_not_overlap(gap):
         for x in (0.0, gap, 1.0)
     ]
     found = labels(still(Scene(name="near", body=[{"name": "bar", "position": (0.5, 0, 0)}], joint=joints)))
-    assert not covered(found) and len(found) == (3 if gap < 0.01 else 4), found
+    assert not overlapping(found) and len(found) == (3 if gap < 0.01 else 4), found
 
 
 def test_joints_at_one_place_share_one_label():
-    """Pin and guide of a slider; the names of the slider-crank's other joints stand alone."""
+    """C, the pin of a slider, and D, its guide, are at one place; the other joints of the slider-crank have
+    labels of their own."""
     scene = SCENES["planar_slider_crank"]()
     assert {"A", "B", "C, D"} <= set(texts(still(scene)))
 
@@ -142,11 +142,12 @@ def test_names_of_bars_that_cross_at_their_middles_do_not_overlap():
             end, ball = (sign * x, sign * y, 0.0), f"{name}{sign}"
             joints.append({"name": ball, "type": "spherical", "bodies": ("ground", name), "anchor": end})
     bodies = [{"name": name, "position": (0.0, 0.0, 0.0)} for name in corners]
-    assert not covered(labels(still(Scene(name="scissors", body=bodies, joint=joints))))
+    assert not overlapping(labels(still(Scene(name="scissors", body=bodies, joint=joints))))
 
 
 def test_bars_of_an_animation_keep_their_length_in_every_frame(turning):
-    """The mechanism turns as one rigid body."""
+    """The mechanism turns as one rigid body: lengths in px change by less than three times the 0.1 px to
+    which coordinates are printed, while ends move by more than 50 px."""
     scene, motion = turning
     lines = [
         node
@@ -158,8 +159,7 @@ def test_bars_of_an_animation_keep_their_length_in_every_frame(turning):
         values = line.find(f"{SVG}animate").attrib["values"].split(";")
         frames = np.array([[p.split(",") for p in frame.split()] for frame in values], dtype=float)
         length = np.linalg.norm(frames[:, 1] - frames[:, 0], axis=1)
-        assert np.ptp(length) < 0.3  # px; each coordinate is printed to 0.1 px
-        assert np.ptp(frames[:, 1, 0]) > 50, "the bar moves"
+        assert np.ptp(length) < 0.3 and np.ptp(frames[:, 1, 0]) > 50
 
 
 def test_animation_of_300_samples_shows_every_third_one():
@@ -193,7 +193,8 @@ def test_animation_of_a_motion_without_samples_is_refused(turning):
 
 
 def test_animation_is_replaced_by_a_still_for_readers_who_prefer_reduced_motion(turning):
-    """CSS media query prefers-reduced-motion hides the group that moves."""
+    """The style of the CSS media query prefers-reduced-motion hides the first group, which moves; the second
+    group stands still. A still picture has no style."""
     moves, stands = ET.fromstring(moving(*turning)).findall(f"{SVG}g")[:2]
     assert (moves.get("class"), stands.get("class")) == ("mbref-moving", "mbref-still")
     assert list(moves.iter(f"{SVG}animate")) and not list(stands.iter(f"{SVG}animate"))
@@ -201,6 +202,8 @@ def test_animation_is_replaced_by_a_still_for_readers_who_prefer_reduced_motion(
 
 
 def test_motions_side_by_side_share_scale_and_time_and_a_shorter_one_stops(turning):
+    """Three panels, two in a row: a motion of 300 samples, its first 100 samples, and the first motion again.
+    Every third sample is a frame."""
     scene, motion = turning
     short = dataclasses.replace(
         motion, **{name: getattr(motion, name)[:100] for name in ("times", "position", "orientation")}
@@ -218,13 +221,14 @@ def test_motions_side_by_side_share_scale_and_time_and_a_shorter_one_stops(turni
         for panel in panels
     ]
     assert frames[0] == frames[2] and len(frames[0]) == len(scene.body)
-    for whole, part in zip(frames[0], frames[1], strict=True):  # frames of the first 100 of 300 samples
+    for whole, part in zip(frames[0], frames[1], strict=True):
         assert part[:33] == whole[:33] and set(part[34:]) == {part[-1]}, "it stays at its last sample"
     heights = [panel.get("y") for panel in panels]
     assert heights[0] == heights[1] != heights[2], "two in a row"
 
 
 def test_only_a_link_with_three_joints_is_drawn_as_a_plate():
+    """K3 of Andrews' squeezer has three; the top has one joint, and is a line to its centre."""
     plates = [shape.name for shape in shapes(SCENES["andrews_squeezer"]()) if shape.is_plate]
     assert plates == ["K3"]
     (top,) = shapes(SCENES["heavy_top"]())
@@ -281,6 +285,7 @@ def test_every_joint_type_is_drawn_by_a_sign_of_its_own():
 
 
 def test_every_load_and_driver_has_a_picture_of_its_own():
+    """Pictures of one mechanism differ with the kind and sense of its load or driver, and without any."""
     scene = SCENES["planar_slider_crank"]().with_(load=())
     loads = [
         {"type": "force", "body": "rod", "point": [0.5, 0, 0], "force": [0, 1, 0]},

@@ -1,4 +1,5 @@
-"""Ensembles: streamed, resumed and spread runs / single runs; variants / what was asked to vary."""
+"""Ensembles: streamed, resumed and spread runs equal single runs; variants differ in the requested
+numbers."""
 
 from __future__ import annotations
 
@@ -28,17 +29,18 @@ DRIVEN = SCENES["spatial_slider_crank_driven"]()
 VARY = [Variation("joint[B].anchor[0]", 0.1, 1e-3, normal=True), Variation("body[slider].mass", 0.9, 1.1)]
 
 
-def poses(runs) -> dict[int, list]:
-    """Samples by place, to be compared."""
+def samples(runs) -> dict[int, list]:
+    """Return positions and velocities of runs, by the place of their scene."""
     return {place: [run.position.tolist(), run.velocity.tolist()] for place, run in runs}
 
 
-def test_runs_spread_over_two_processes_equal_single_runs(tmp_path: Path):
+def test_runs_spread_over_two_processes_equal_single_runs():
+    """To the bit."""
     scenes = list(variants(DRIVEN, VARY, 5))
     alone = {k: simulate(scene, METHOD, TIMES, LIMITS) for k, scene in enumerate(scenes)}
     with processes(2) as pool:
-        spread = poses(ensemble(iter(scenes), TIMES, METHOD, LIMITS, pool))
-    assert spread == poses(alone.items())
+        spread = samples(ensemble(iter(scenes), TIMES, METHOD, LIMITS, pool))
+    assert spread == samples(alone.items())
     masses = [scene.body[2].mass for scene in scenes]
     assert len(set(masses)) == 5, f"the variants are to differ: {masses}"
 
@@ -56,11 +58,11 @@ def test_variants_of_a_slider_crank_move_as_the_closed_form_of_their_lengths():
         theta = DRIVEN.driver[0].polynomial[1] * TIMES
         exact = np.sqrt(l**2 - (r * np.cos(theta) - OFFSET) ** 2 - (r * np.sin(theta)) ** 2)
         off = np.abs(runs[k].position[:, 2, 1] - exact).max()
-        assert off < 1e-9, f"variant {k} with r = {r}: off by {off:.2e} m"
+        assert off < 1e-9, f"variant {k} with r = {r}: off by {off:.2e} m"  # 100 times rtol
 
 
-def test_stored_result_serves_only_equal_limits_and_times(tmp_path: Path):
-    """Each computed run adds a line to the file; a run that is served from the file adds none."""
+def test_stored_run_is_read_from_the_file_only_for_equal_limits_and_times(tmp_path: Path):
+    """Each computed run adds a line to the file; a run that is read from the file adds none."""
     path = tmp_path / "runs.jsonl"
     with ThreadPoolExecutor(1) as one:
         [(_, rough)] = ensemble([DRIVEN], TIMES, METHOD, Limits(rtol=1e-4), one, path)
@@ -102,7 +104,7 @@ def test_variant_depends_on_its_seed_and_number_alone_and_differs_in_nothing_els
     assert next(variants(DRIVEN, VARY, 1, seed=4)) != scenes[0]
 
 
-def test_two_numbers_of_one_body_vary():
+def test_two_numbers_of_one_body_vary_within_their_bounds():
     varied = [Variation("body[slider].mass", 2.0, 3.0), Variation("body[slider].position[2]", 0.1, 0.2)]
     (scene,) = variants(DRIVEN, varied, 1)
     assert 2.0 <= scene.body[2].mass <= 3.0 and 0.1 <= scene.body[2].position[2] <= 0.2
@@ -179,6 +181,7 @@ class Fragile(Executor):
 
 
 def test_killed_run_is_reported_as_crashed_and_not_stored(tmp_path: Path):
+    """The process dies in each call that has the second of three scenes."""
     scenes, path = list(variants(DRIVEN, VARY, 3)), tmp_path / "runs.jsonl"
     runs = dict(ensemble(scenes, TIMES, METHOD, LIMITS, Fragile(lambda given: scenes[1] in given), path))
     assert [runs[k].outcome.name for k in range(3)] == ["COMPLETED", "CRASHED", "COMPLETED"]
@@ -187,6 +190,7 @@ def test_killed_run_is_reported_as_crashed_and_not_stored(tmp_path: Path):
 
 
 def test_runs_before_a_faulty_scene_are_returned():
+    """Scene 25 of 30 has neither masses nor a driver: 0 to 24 are returned before the error."""
     scenes = list(variants(DRIVEN, VARY, 30))
     scenes[25] = scenes[25].with_(
         driver=(), body=tuple(body.model_copy(update={"mass": None, "inertia": None}) for body in DRIVEN.body)
