@@ -36,6 +36,7 @@ from mbref.kernels.disk_cache import (
     remove_damaged,
 )
 from mbref.kernels.file_lock import held, is_held
+from mbref.kernels.helper_code import HelperCompiler
 from mbref.kernels.interrupts import interrupts_kept
 
 # No fastmath: the same bits with and without the JIT.  Without numba's runtime (``_nrt``, undocumented there)
@@ -125,7 +126,7 @@ class Helper:
     @functools.cached_property
     def _called(self) -> Any:
         """Return the dispatcher for calls from kernels."""
-        return njit(**self._options, **NO_WRAPPERS)(self.function)
+        return njit(pipeline_class=HelperCompiler, **self._options, **NO_WRAPPERS)(self.function)
 
     @functools.cached_property
     def _callable(self) -> Any:
