@@ -28,7 +28,9 @@ def test_lock_is_held_only_inside_its_with_statement(tmp_path):
     assert not is_held(path)
 
 
-@pytest.mark.parametrize("end", [lambda process: process.stdin.close(), lambda process: process.kill()])
+@pytest.mark.parametrize(
+    "end", [lambda process: process.stdin.close(), lambda process: process.kill()], ids=["ends", "killed"]
+)
 def test_lock_of_another_process_is_free_after_it_ends_or_is_killed(end, tmp_path):
     with holder(tmp_path / "lock") as process:
         assert is_held(tmp_path / "lock")

@@ -1,4 +1,4 @@
-"""Integrators against closed forms, truths, SciPy's Adams codes, and themselves without the JIT."""
+"""Integrators against closed forms, the judge's truth and SciPy's Adams codes."""
 
 import numpy as np
 import pytest
@@ -81,7 +81,8 @@ def test_dop853_converges_with_order_eight(error, longest):
 @pytest.mark.parametrize("order", [1, 2, 4, 6, 8])
 @pytest.mark.parametrize("error", [oscillator_error, pendulum_error])
 def test_adams_of_a_largest_order_converges_with_one_order_more(error, order):
-    """With local extrapolation, order k converges like order k + 1 in the number of steps."""
+    """With local extrapolation, order k converges like order k + 1 in the number of steps, here to 20 %: the
+    order varies in the first steps of a run."""
     runs = [
         error(f"lm1+none/adams[max_order={order}]", np.array([0.0, 5.0]), rtol=rtol)
         for rtol in 10.0 ** -np.arange(4, 7 + min(order, 4), 0.5)
@@ -100,8 +101,8 @@ SCENES_AND_TRUTHS = [
 
 
 @pytest.mark.parametrize(("name", "end", "method"), SCENES_AND_TRUTHS)
-def test_adams_error_is_proportional_to_the_tolerance(name, end, method):
-    """Against the judge's truth, over nine decades: exponent 1 to 0.15, error below 500 tolerances."""
+def test_adams_error_is_proportional_to_the_tolerance_and_below_500_tolerances(name, end, method):
+    """Against the judge's truth, over nine decades of the tolerance: the exponent is 1, to 0.15."""
     scene, tolerances = SCENES[name](), 10.0 ** -np.arange(4, 13)
     errors = [
         judged(scene, ran(scene, f"{method}/adams", np.linspace(0, end, 6), rtol=rtol)) for rtol in tolerances
@@ -164,24 +165,25 @@ def test_adams_evaluates_twice_a_step():
     assert abs(cost.rhs - 2 * cost.steps - cost.rejected) <= calls, cost
 
 
-# stabilisation, its scene and end, error allowed in tolerances.  Partitioning multiplies errors before it
-# changes coordinates, when the one it integrates is close to its turning point.
+# stabilisation, its scene and end (s), error in tolerances: ten times the largest found. Partitioning
+# multiplies errors before it changes coordinates, when the one it integrates is close to its turning point.
 STABILISED = [
-    ("lm1+none", "spatial_slider_crank", 0.02, 1e3),
-    ("lm1+baumgarte[alpha=500,beta=500]", "spatial_slider_crank", 0.02, 1e3),
-    ("lm1+projection", "spatial_slider_crank", 0.02, 1e3),
-    ("lm1+partitioning", "spatial_slider_crank", 0.02, 1e5),
-    ("mpi-svd+partitioning", "planar_slider_crank_gravity", 0.5, 1e4),
-    ("lm1+partitioning", "spatial_slider_crank_driven", 0.1, 1e0),  # nothing is left to integrate
+    ("lm1+none", "spatial_slider_crank", 0.02, 30),
+    ("lm1+baumgarte[alpha=500,beta=500]", "spatial_slider_crank", 0.02, 30),
+    ("lm1+projection", "spatial_slider_crank", 0.02, 30),
+    ("lm1+partitioning", "spatial_slider_crank", 0.02, 150),
+    ("mpi-svd+partitioning", "planar_slider_crank_gravity", 0.5, 1000),
+    ("lm1+partitioning", "spatial_slider_crank_driven", 0.1, 1e-3),  # nothing is left to integrate
 ]
 
 
 @pytest.mark.parametrize(("method", "name", "end", "allowed"), STABILISED)
-def test_adams_error_is_within_a_factor_of_the_tolerance_under_every_stabilisation(
+def test_adams_error_is_below_a_multiple_of_the_tolerance_under_every_stabilisation(
     method, name, end, allowed
 ):
+    """Against the judge's truth; the multiple is ``allowed``."""
     scene = SCENES[name]()
-    for rtol in (1e-6, 1e-9):  # partitioning changes coordinates
+    for rtol in (1e-6, 1e-9):
         error = judged(scene, ran(scene, f"{method}/adams", np.linspace(0, end, 6), rtol=rtol))
         assert error < allowed * rtol, f"{name}, {method}, rtol {rtol:g}: error {error:.2e}"
 
@@ -202,24 +204,26 @@ def test_coefficients_of_dop853_are_those_of_scipy():
 @pytest.mark.parametrize("method", ["alf-dual+projection", "taylor"])
 @pytest.mark.parametrize("end", [10.0, 100.0])
 def test_error_of_a_long_run_stays_below_a_thousand_tolerances(end, method):
-    """A crank that turns under gravity, rtol 1e-9; before, errors of its frequency added up to 1.4e-5 in 100
-    s."""
+    """A crank that turns under gravity, rtol 1e-9, against the judge's truth. Before, errors of its frequency
+    added up to 1.4e-5 in 100 s."""
     scene = next(scene for scene in stability.scenes() if scene.name == f"duration[{end:g}]")
     run = simulate(scene, method, np.linspace(0.0, end, 11), Limits(rtol=1e-9))
     assert run.outcome.label == "COMPLETED" and measure(scene, run, truth_for(scene))["error"] < 1e-6
 
 
-def test_run_at_ten_million_radians_a_second_needs_few_steps():
-    """The first step is 1e-10 of the run; a tolerance divided by its share would be below rounding."""
+def test_run_at_ten_million_radians_a_second_completes_in_2000_steps_and_meets_the_truth():
+    """The first step is 1e-10 of the run; a tolerance divided by its share would be below rounding. The truth
+    is the judge's."""
     scene = next(scene for scene in stability.scenes() if scene.name == "speed[1e+07]")
     end = 0.1 * scene.duration  # before its first singular position
     run = simulate(scene, "alf-dual+projection", [end], Limits(most_steps=2000))
     assert run.outcome.label == "COMPLETED", run.message
-    assert measure(scene, run, truth_for(scene))["error"] < 1e-6
+    assert measure(scene, run, truth_for(scene))["error"] < 1e-6  # 1000 times rtol
 
 
 def test_fewer_than_a_tenth_of_the_steps_of_an_accelerating_crank_are_rejected():
-    """Otherwise the control of the step length would be unstable."""
+    """The control of the step length is stable: it does not alternate between long, rejected steps and short
+    ones."""
     scene, times = SCENES["planar_slider_crank"](), [0.2]
     run = ran(scene, "alf-dual+projection", times, rtol=1e-7)
     assert run.cost.rejected < 0.1 * run.cost.steps, (run.cost.rejected, run.cost.steps)

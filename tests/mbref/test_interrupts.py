@@ -1,4 +1,5 @@
-"""Interrupts during a compilation / signals that this process sends to itself."""
+"""Interrupts of a compilation inside ``with interrupts_kept()``; each test sends the signal to its own
+process."""
 
 from __future__ import annotations
 
@@ -20,8 +21,9 @@ def _python_handler() -> Iterator[None]:
     signal.signal(signal.SIGINT, before)
 
 
-def test_interrupt_swallowed_inside_the_block_is_raised_at_its_end():
-    """A function that LLVM calls loses the exception, as ``except`` does here."""
+def test_interrupt_lost_during_a_compilation_is_raised_at_its_end():
+    """A function that LLVM calls loses the exception, as ``except`` does here. Python's handler is back
+    afterwards."""
     done = []
     with pytest.raises(KeyboardInterrupt), interrupts_kept():
         try:
@@ -32,13 +34,13 @@ def test_interrupt_swallowed_inside_the_block_is_raised_at_its_end():
     assert done == ["lost", "compiled"] and signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_block_without_an_interrupt_raises_nothing():
+def test_handler_of_python_is_back_after_a_compilation_without_interrupt():
     with interrupts_kept():
         pass
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_interrupt_that_nothing_swallows_ends_the_block_at_once():
+def test_interrupt_that_is_not_lost_ends_the_compilation_at_once():
     done = []
     with pytest.raises(KeyboardInterrupt), interrupts_kept():
         signal.raise_signal(signal.SIGINT)
@@ -46,7 +48,7 @@ def test_interrupt_that_nothing_swallows_ends_the_block_at_once():
     assert not done and signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_error_of_the_block_is_raised_instead_of_a_swallowed_interrupt():
+def test_error_of_a_compilation_is_raised_instead_of_a_lost_interrupt():
     with pytest.raises(ZeroDivisionError), interrupts_kept():
         with contextlib.suppress(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)

@@ -21,7 +21,7 @@ def run(scene: Scene, method: str, times=TIMES) -> mbref.Motion:
     return motion
 
 
-def gap(found: np.ndarray, exact: np.ndarray) -> float:
+def error(found: np.ndarray, exact: np.ndarray) -> float:
     """Return the largest difference over the largest exact value."""
     return float(np.abs(found - exact).max() / np.abs(exact).max())
 
@@ -31,15 +31,15 @@ def test_force_by_a_table_of_a_cubic_acts_between_its_times(method):
     """The table has values of a cubic a(t), an acceleration (m/s²) from 0.5 s to 1.5 s: its spline is the
     cubic. The body moves by ∬ a dt² and goes on at a constant speed after 1.5 s (`switched`)."""
     moved = run(scenes.thrown(), method).position[:, 0] @ AXIS
-    assert gap(moved, scenes.switched(TIMES)) <= CLOSED_FORM
+    assert error(moved, scenes.switched(TIMES)) <= CLOSED_FORM
 
 
 @pytest.mark.parametrize("method", ("taylor", "lm1+projection"))
 def test_driver_by_a_table_of_a_cubic_turns_by_the_cubic(method):
-    """The spline through a cubic's values is the cubic; acceleration: its second derivative."""
+    """The spline through a cubic's values is the cubic; the angular acceleration is its second derivative."""
     motion = run(scenes.driven_wheel(), method)
-    assert gap(motion.joint("J").angle, CUBIC(TIMES) - CUBIC(0.0)) <= CLOSED_FORM
-    assert gap(motion.angular_acceleration[:, 0, 2], CUBIC.deriv(2)(TIMES)) <= CLOSED_FORM
+    assert error(motion.joint("J").angle, CUBIC(TIMES) - CUBIC(0.0)) <= CLOSED_FORM
+    assert error(motion.angular_acceleration[:, 0, 2], CUBIC.deriv(2)(TIMES)) <= CLOSED_FORM
 
 
 def test_acceleration_at_the_time_of_switching_is_the_one_afterwards():
@@ -57,11 +57,12 @@ def test_step_by_series_crosses_each_polynomial_piece_of_a_table_at_once():
 
 
 def test_load_that_begins_to_act_moves_a_body_from_rest():
-    """A force of 1 N from a time s on moves 1 kg by (2 - s)² / 2 m up to t = 2 s."""
+    """A force of 1 N/kg from a time s on moves a body by (2 - s)² / 2 m up to t = 2 s; s is late, so that the
+    body stays at rest for nearly the whole run, or early."""
     for start in (1.999, 1e-3):
         scene = scenes.pushed(Factor(start=start)).with_(duration=2.0)
         moved = run(scene, "taylor", [0.0, 2.0]).joint("J").displacement[-1]
-        assert moved == pytest.approx((2.0 - start) ** 2 / 2, rel=1e-9)
+        assert moved == pytest.approx((2.0 - start) ** 2 / 2, rel=1e-9)  # rtol
 
 
 def test_table_is_a_twice_differentiable_spline_through_its_rows():
@@ -72,10 +73,12 @@ def test_table_is_a_twice_differentiable_spline_through_its_rows():
     for t in times[1:-1]:
         beside = [side * 0.05 * np.arange(4) for side in (1.0, -1.0)]  # s, within the pieces
         second = [2 * np.polyfit(x, factor.values(t + x), 3)[1] for x in beside]
-        assert second[0] == pytest.approx(second[1], abs=1e-9)
+        assert second[0] == pytest.approx(second[1], abs=1e-9)  # 1/s²; rounding 1e-16 over (0.05 s)² is 4e-14
 
 
 def test_outputs_of_joint_loads_are_force_or_torque_and_joint_coordinates():
+    """Load 0 is a joint force of 2 N times a table, load 2 a joint torque of -0.3 N m, and load 1 a spring of
+    30 N/m with a damper of 0.7 N s/m along joint C, relaxed at 0.05 m."""
     motion = run(scenes.arm(), "taylor")
     names = list(motion.columns("load(0)"))
     assert names == [

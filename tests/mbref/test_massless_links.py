@@ -14,6 +14,8 @@ LOAD = Body(name="load", mass=2.0, inertia=(0.1, 0.2, 0.3), position=(0.3, 0.1, 
 LINK = Body(name="link", mass=0.0, inertia=(0.0, 0.0, 0.0), position=(0.0, 0.0, 0.0))
 CENTRE, X, Y, Z = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 METHODS = ("taylor", "lm1+projection", "alf+projection")
+RTOL = 1e-11
+ACCURACY = 10 * RTOL  # m
 
 
 def hip(*more: Body | Revolute) -> Scene:
@@ -36,22 +38,22 @@ def test_load_of_a_gantry_with_a_massless_link_swings_on_one_slide_and_falls_on_
     )
     spring = SlideSpring(joint="x", stiffness=50.0, natural_displacement=-0.2)
     scene = Scene(name="g", gravity=(0.0, 0.0, -9.81), body=(LINK, LOAD), joint=slides, load=(spring,))
-    motion = simulate(scene, method, times=TIMES, rtol=1e-11)
-    assert np.allclose(motion["load"].position[:, 0], 0.1 + 0.2 * np.cos(5.0 * TIMES), atol=1e-10)
-    assert np.allclose(motion["load"].position[:, 2], -1.0 - 9.81 / 2 * TIMES**2, atol=1e-10)
-    assert np.allclose(motion["link"].position[:, 0], -0.2 + 0.2 * np.cos(5.0 * TIMES), atol=1e-10)
+    motion = simulate(scene, method, times=TIMES, rtol=RTOL)
+    assert np.allclose(motion["load"].position[:, 0], 0.1 + 0.2 * np.cos(5.0 * TIMES), atol=ACCURACY)
+    assert np.allclose(motion["load"].position[:, 2], -1.0 - 9.81 / 2 * TIMES**2, atol=ACCURACY)
+    assert np.allclose(motion["link"].position[:, 0], -0.2 + 0.2 * np.cos(5.0 * TIMES), atol=ACCURACY)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_two_hinges_at_a_massless_link_move_as_a_universal_joint(method):
-    """The two crossing hinges form this joint, so that the body moves alike."""
+    """Two crossing hinges form this joint; a scene with it has no massless body, and no method is special to
+    it."""
     joint = Universal(name="u", bodies=("ground", "load"), anchor=CENTRE, axes=(X, Y))
-    other = simulate(
-        Scene(name="u", gravity=(0.0, 0.0, -9.81), body=(LOAD,), joint=(joint,)), times=TIMES, rtol=1e-11
-    )
-    motion = simulate(hip(), method, times=TIMES, rtol=1e-11)
+    scene = Scene(name="u", gravity=(0.0, 0.0, -9.81), body=(LOAD,), joint=(joint,))
+    other = simulate(scene, times=TIMES, rtol=RTOL)
+    motion = simulate(hip(), method, times=TIMES, rtol=RTOL)
     assert motion.outcome == other.outcome == Outcome.COMPLETED
-    assert np.allclose(motion["load"].position, other["load"].position, atol=1e-9)
+    assert np.allclose(motion["load"].position, other["load"].position, atol=10 * ACCURACY)
 
 
 def test_method_that_divides_by_masses_names_the_massless_link():
@@ -60,6 +62,7 @@ def test_method_that_divides_by_masses_names_the_massless_link():
 
 
 def test_free_link_of_mass_zero_is_named_as_undetermined():
+    """The link hangs by a hinge at the load, and nothing else acts on it."""
     tip = LINK.model_copy(update={"name": "tip", "position": (0.3, 0.1, -1.2)})
     hinge = Revolute(name="c", bodies=("load", "tip"), anchor=(0.3, 0.1, -1.1), axis=Y)
     for method in ("taylor", "lm1+projection"):
@@ -71,9 +74,9 @@ def test_armature_determines_the_motion_of_a_free_link_of_mass_zero():
     """The motion completes and keeps its energy, of which the rotor has a part."""
     tip = LINK.model_copy(update={"name": "tip", "position": (0.3, 0.1, -1.2)})
     hinge = Revolute(name="c", bodies=("load", "tip"), anchor=(0.3, 0.1, -1.1), axis=Y, armature=0.1)
-    motion = simulate(hip(tip, hinge), times=TIMES, rtol=1e-11)
+    motion = simulate(hip(tip, hinge), times=TIMES, rtol=RTOL)
     assert motion.outcome == Outcome.COMPLETED
-    assert np.ptp(motion.energy) < 1e-9 * np.ptp(motion.kinetic_energy)
+    assert np.ptp(motion.energy) < 100 * RTOL * np.ptp(motion.kinetic_energy)
 
 
 def test_mass_of_zero_with_an_inertia_is_refused():
@@ -83,7 +86,8 @@ def test_mass_of_zero_with_an_inertia_is_refused():
 
 
 def test_body_whose_centre_is_off_its_anchor_by_rounding_slides_at_its_speed():
-    """A distance of 1e-16 m does not count as the length of the mechanism."""
+    """It slides at 1 m/s. The distance of 1e-16 m does not count as the length of the mechanism, by which
+    errors are divided."""
     slide = Translational(name="x", bodies=("ground", "load"), anchor=(0.45, -0.05, -0.275), axis=X)
     load = LOAD.model_copy(update={"position": (0.45000000000000007, -0.05, -0.275), "velocity": X})
     motion = simulate(Scene(name="s", body=(load,), joint=(slide,)), times=TIMES)

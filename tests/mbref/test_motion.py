@@ -1,4 +1,4 @@
-"""Motion: bodies and joints by name / closed forms; energies / the judge's; tables, files."""
+"""Motion: bodies and joints by name, energies, tables, plots and files."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from mbref.scene import Body
 
 ROOT = Path(__file__).parents[2]
 TIMES = np.linspace(0.0, 0.1, 21)
+ROUNDING = 1e-11  # rad, m: of angles of 12 rad
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +33,7 @@ def crank() -> Motion:
 
 @pytest.fixture(scope="module")
 def door() -> Motion:
-    """A spring and a torsion spring, without their dampers."""
+    """A door on a spring and a torsion spring, without their dampers, for 1 s; about 5 J are exchanged."""
     scene = Scene.from_file(ROOT / "examples" / "door_closer.toml")
     loads = tuple(load.model_copy(update={"damping": 0.0}) for load in scene.load)
     return simulate(scene.with_(load=loads), times=np.linspace(0.0, 1.0, 6), limits=Limits(rtol=1e-11))
@@ -42,32 +43,33 @@ def test_angle_of_a_driven_joint_is_counted_over_full_turns(driven):
     """The driver's rate is -124.8 rad/s, nearly two turns in 0.1 s; a joint that does not turn about one
     axis has no angle."""
     joint = driven.joint("A")
-    assert np.abs(joint.angle + 124.8 * driven.times).max() < 1e-9
-    assert np.abs(joint.rate + 124.8).max() < 1e-8
+    assert np.abs(joint.angle + 124.8 * driven.times).max() < ROUNDING
+    assert np.abs(joint.rate + 124.8).max() < 100 * ROUNDING  # rad/s
     assert joint.displacement is None and driven.joint("B").angle is None
 
 
 def test_angle_of_a_joint_does_not_depend_on_the_sign_of_quaternions(driven):
-    """p and -p are one orientation, also at the first sample."""
+    """p and -p are one orientation. Signs of all bodies are changed, then of the crank alone at samples 1, 2,
+    4, 5 …: joint A counts as before."""
     other = Motion.of(driven.mechanism, dataclasses.replace(driven, orientation=-driven.orientation))
     crank_alone = driven.orientation * np.array([-1.0, 1.0, 1.0])[:, None]
     one = Motion.of(driven.mechanism, dataclasses.replace(driven, orientation=crank_alone))
     for motion in (other, one):
-        assert np.abs(motion.joint("A").angle - driven.joint("A").angle).max() < 1e-9
+        assert np.abs(motion.joint("A").angle - driven.joint("A").angle).max() < ROUNDING
 
 
 def test_displacement_of_a_guide_is_how_far_its_slider_moved(crank):
     joint, slider = crank.joint("D"), crank["slider"]
-    assert np.allclose(joint.displacement, slider.position[:, 0] - slider.position[0, 0], atol=1e-12)
+    assert np.allclose(joint.displacement, slider.position[:, 0] - slider.position[0, 0], atol=ROUNDING)
     assert joint.angle is None and joint.displacement[-1] != 0
 
 
 def test_rotation_vector_of_a_universal_joint_is_the_relative_rotation(driven):
-    """The coupler stays parallel to the ground, so that it turns by +124.8 rad/s · t against the crank,
-    modulo 2π."""
+    """Joint B is between crank and coupler. The coupler stays parallel to the ground, so that it turns by
+    +124.8 rad/s · t against the crank, modulo 2π."""
     vector = driven.joint("B").rotation
     turned = np.arctan2(np.sin(124.8 * driven.times), np.cos(124.8 * driven.times))
-    assert np.abs(vector[:, 2] - turned).max() < 1e-8 and np.abs(vector[:, :2]).max() < 1e-8
+    assert np.abs(vector[:, 2] - turned).max() < ROUNDING and np.abs(vector[:, :2]).max() < ROUNDING
 
 
 def test_unknown_body_or_joint_is_refused_with_the_known_ones(crank):
@@ -92,18 +94,20 @@ def test_kinetic_energy_and_energy_of_springs_are_the_judge_s(name, request):
 
 
 def test_energy_of_a_motion_on_undamped_springs_is_constant(door):
-    """A door on a spring and a torsion spring exchanges more than 1 J."""
-    assert np.ptp(door.energy) < 1e-8, door.energy
-    assert np.ptp(door.kinetic_energy) > 1.0
+    """The sum of kinetic energy and energies of a spring and a torsion spring, to 100 rtol of what they
+    exchange."""
+    assert np.ptp(door.energy) < 100 * 1e-11 * np.ptp(door.kinetic_energy)
 
 
 def test_energy_of_a_motion_under_gravity_is_constant():
+    """To 100 rtol of the kinetic energy that the rhombus gains."""
     motion = simulate("four_bar_gravity", times=TIMES, limits=Limits(rtol=1e-11))
-    assert np.ptp(motion.energy) < 1e-9 * np.ptp(motion.kinetic_energy)
+    assert np.ptp(motion.energy) < 100 * 1e-11 * np.ptp(motion.kinetic_energy)
 
 
 def test_energy_of_a_tumbling_body_is_that_of_its_principal_axes():
-    """½ (A p² + B q² + C r²) with the rates about its own axes, constant without moments."""
+    """½ (A p² + B q² + C r²) with the rates about its own axes: 9.7 J, constant without moments while the
+    angular velocity changes by more than 1 rad/s."""
     moments, spin, turn = np.array([1.0, 2.0, 2.5]), np.array([3.0, 0.4, -1.0]), (0.5, -0.5, 0.5, 0.5)
     body = Body(
         name="top",
@@ -117,10 +121,10 @@ def test_energy_of_a_tumbling_body_is_that_of_its_principal_axes():
     own = np.array([-spin[2], -spin[0], spin[1]])  # the quaternion turns x to -z, y to -x and z to y
     assert motion.kinetic_energy[0] == pytest.approx(moments @ own**2 / 2, rel=1e-14)
     assert np.ptp(motion.angular_velocity[:, 0], axis=0).max() > 1.0
-    assert np.ptp(motion.kinetic_energy) < 1e-9
+    assert np.ptp(motion.kinetic_energy) < 10 * 1e-11 * 9.7  # ten times rtol
 
 
-def test_energy_without_masses_names_the_body():
+def test_energy_of_a_motion_without_masses_is_refused_with_the_body_and_is_no_column():
     scene = find_scene("four_bar")
     bare = scene.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in scene.body))
     motion = simulate(bare, "taylor", [0.0, 0.01])
@@ -202,6 +206,7 @@ def test_panel_of_a_plot_is_labelled_with_its_quantity_and_unit(crank):
 
 
 def test_plot_without_columns_shows_joint_coordinates_and_energy(crank):
+    """``grouped`` returns the columns of each panel, by its quantity."""
     groups = grouped(list(crank.columns())[1:], ())
     assert set(groups) == {"angle", "displacement", "energy"}
     assert groups["angle"] == ["A.angle", "B.angle"]

@@ -30,7 +30,7 @@ NAMES = (
 
 @pytest.mark.parametrize("name", NAMES)
 def test_run_s_table_shows_a_name_literally(name: str, capsys: pytest.CaptureFixture[str]):
-    """The scene, its body, the method and the message of the run have this name."""
+    """The scene, its body, the method and the message of the run have this name: it is shown four times."""
     body = Body(name=name, mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
     still = np.zeros((1, 1, 3))
     first = (name, "mbref", "1", name, {}, np.zeros(1), (name,))
@@ -44,6 +44,7 @@ def test_run_s_table_shows_a_name_literally(name: str, capsys: pytest.CaptureFix
 
 @pytest.mark.parametrize("name", NAMES)
 def test_diagnosis_shows_a_name_literally(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    """The scene is read from a file that ``save`` wrote."""
     body = Body(name=name, mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
     Scene(name=name, body=(body,)).save(tmp_path / "scene.toml")
     assert main(["diagnose", str(tmp_path / "scene.toml"), "--json"]) == 0

@@ -22,8 +22,8 @@ from tests.helpers.coupled_mechanisms import (
 )
 
 METHODS = ("taylor", "alf-dual+projection/dop853")
-CLOSED_FORM = 1e-12  # of the largest value
-STEPS = 5e-3  # relative; the least displacement is found in finite steps
+CLOSED_FORM = 1e-12  # of the largest value, and of constraints (m, rad)
+STEPS = 5e-3  # relative; the least displacement is found in finite steps, each the least one
 EVERY = (
     (gear_pair, "teeth", 0.4),
     (gear_pair, "teeth", -7.0),
@@ -42,7 +42,7 @@ def shifted(make, name: str, offset: float) -> Scene:
     return make().with_(f"coupling[{name}].offset", offset)
 
 
-def gap(found: np.ndarray, exact: np.ndarray) -> float:
+def error(found: np.ndarray, exact: np.ndarray) -> float:
     """Return the largest difference over the largest exact value, if that is above 1."""
     return float(np.abs(found - exact).max() / max(1.0, np.abs(exact).max()))
 
@@ -57,8 +57,8 @@ def test_gear_pair_starts_at_its_offset_by_the_least_displacement_and_turns_from
     turned, (a, b) = 2.0 / inertia * times**2 / 2, (motion.joint(name).angle for name in "AB")
     assert a[0] == pytest.approx(-ratio * 0.2 / inertia * offset, rel=STEPS)
     assert b[0] == pytest.approx(0.03 / inertia * offset, rel=STEPS)
-    assert max(gap(a - a[0], turned), gap(b, offset + ratio * a)) <= CLOSED_FORM
-    assert motion.violation.position.max() < 1e-12
+    assert max(error(a - a[0], turned), error(b, offset + ratio * a)) <= CLOSED_FORM
+    assert motion.violation.position.max() < CLOSED_FORM
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -71,7 +71,7 @@ def test_rack_starts_at_its_offset_by_the_least_displacement_and_falls_from_ther
     a, b = motion.joint("A").angle, motion.joint("B").displacement
     assert a[0] == pytest.approx(-ratio * 1.5 / inertia * offset, rel=STEPS)
     assert b[0] == pytest.approx(0.2 / inertia * offset, rel=STEPS)
-    assert max(gap(b - b[0], falls), gap(b, offset + ratio * a)) <= CLOSED_FORM
+    assert max(error(b - b[0], falls), error(b, offset + ratio * a)) <= CLOSED_FORM
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -84,12 +84,13 @@ def test_nut_of_a_screw_starts_at_its_offset_by_the_least_displacement_and_turns
     a, b = motion.joint("S").angle, motion.joint("S").displacement
     assert a[0] == pytest.approx(-ratio * 2.0 / inertia * offset, rel=STEPS)
     assert b[0] == pytest.approx(0.02 / inertia * offset, rel=STEPS)
-    assert max(gap(a - a[0], turns), gap(b, offset + ratio * a)) <= CLOSED_FORM
+    assert max(error(a - a[0], turns), error(b, offset + ratio * a)) <= CLOSED_FORM
 
 
 @every
 def test_coordinates_obey_the_offset_up_to_full_turns(make, name, offset):
-    """second = offset + ratio · first, where an angle counts up to 2πk, |k| ≤ 3."""
+    """second = offset + ratio · first at all samples, where 2πk with one whole |k| ≤ 3 may be added to an
+    angle."""
     scene = shifted(make, name, offset)
     motion = mbref.simulate(scene, times=[0.0, 0.1, 0.2])
     (coupling,) = (c for c in scene.coupling if c.name == name)
@@ -99,20 +100,20 @@ def test_coordinates_obey_the_offset_up_to_full_turns(make, name, offset):
     turns = 2 * np.pi * np.arange(-3, 4)
     ends = (turns if kind == "angle" else np.zeros(1) for kind in (one, other))
     first_turns, second_turns = ends
-    gaps = off + (second_turns[:, None] - coupling.ratio * first_turns)[..., None]
-    assert np.abs(gaps).max(axis=2).min() < 1e-12
+    remainders = off + (second_turns[:, None] - coupling.ratio * first_turns)[..., None]
+    assert np.abs(remainders).max(axis=2).min() < CLOSED_FORM
 
 
 @every
-def test_assembled_scene_obeys_joints_and_has_no_offset(make, name, offset):
-    """It has the counts of the scene without offset, and its motion is that of the scene with it, to the
-    bit."""
+def test_assembled_scene_has_no_offset_and_moves_as_the_scene_with_offset(make, name, offset):
+    """It satisfies the joints, has the counts of the scene without offset, and is its own assembly. A run of
+    the scene with offset begins at this pose, so that both motions are equal to the bit."""
     scene = shifted(make, name, offset)
     found = mbref.assembled(scene)
     assert mbref.assembled(found) is found and mbref.counts(found) == mbref.counts(make())
     assert [c.offset for c in found.coupling] == [0.0] * len(found.coupling)
     model = Model(found)
-    assert np.abs(model.terms(0.0, model.start()).phi).max() < 1e-13
+    assert np.abs(model.terms(0.0, model.start()).phi).max() < CLOSED_FORM
     motions = [mbref.simulate(each, times=[0.0, 0.2]) for each in (scene, found)]
     assert np.array_equal(motions[0].position, motions[1].position)
 
@@ -126,25 +127,26 @@ def test_offset_moves_the_wheel_that_is_not_driven():
     """A driver turns A by t; B is at 0.4 - 0.5 t."""
     scene = shifted(gear_pair, "teeth", 0.4).with_(driver=[{"joint": "A", "polynomial": [0.0, 1.0]}])
     motion = mbref.simulate(scene, times=[0.0, 0.5])
-    assert gap(motion.joint("A").angle, np.array([0.0, 0.5])) <= CLOSED_FORM
-    assert gap(motion.joint("B").angle, np.array([0.4, 0.4 - 0.5 * 0.5])) <= CLOSED_FORM
+    assert error(motion.joint("A").angle, np.array([0.0, 0.5])) <= CLOSED_FORM
+    assert error(motion.joint("B").angle, np.array([0.4, 0.4 - 0.5 * 0.5])) <= CLOSED_FORM
 
 
 @pytest.mark.parametrize("offset", [0.4, 8.0])
 def test_natural_angle_of_a_spring_counts_from_the_pose_in_the_file(offset):
-    """A spring that is relaxed at the assembled start leaves the wheels at rest, also for an offset of more
-    than a turn (rad)."""
+    """A spring of 3 N m/rad that is relaxed at the assembled start leaves the wheels at rest, also for an
+    offset of more than a turn (rad). There A is at -r J_B c / J, r = -0.5, J_B = 0.2 kg m², J = 0.08 kg
+    m²."""
     scene = shifted(gear_pair, "teeth", offset)
     at = mbref.simulate(scene, times=[0.0]).joint("A").angle[0]
-    assert at == pytest.approx(0.5 * 0.2 / 0.08 * offset, rel=0.01)
+    assert at == pytest.approx(0.5 * 0.2 / 0.08 * offset, rel=STEPS)
     spring = {"type": "torsion_spring", "joint": "A", "stiffness": 3.0, "natural_angle": at}
     motion = mbref.simulate(scene.with_(load=[spring]), times=[0.0, 1.0])
-    assert np.abs(motion.angular_velocity).max() < 1e-11
-    assert motion.violation.position.max() < 1e-12
+    assert np.abs(motion.angular_velocity).max() < 1e-11  # rad/s, of rounded angles of 10 rad in 1 s
 
 
 def test_ends_of_springs_move_with_their_bodies_into_the_assembled_pose():
-    """The offset lifts the rack, and with it the end on the rack, not the end on the ground."""
+    """The offset of 3 mm lifts the rack by more than 2 mm, and with it the end on the rack, not the end on
+    the ground."""
     spring = {
         "type": "spring",
         "bodies": ["ground", "rack"],
@@ -180,6 +182,7 @@ def test_offset_has_the_unit_of_the_second_coordinate(tmp_path):
 
 
 def test_every_scene_of_an_ensemble_starts_at_its_own_offset():
+    """Runs of three scenes together equal single runs to the bit."""
     scenes = [shifted(gear_pair, "teeth", offset).with_(duration=0.5) for offset in (0.0, 0.1, 0.2)]
     together = simulate_all(scenes, "taylor", np.array([0.0, 0.5]), Limits())
     for k, scene in enumerate(scenes):
@@ -188,6 +191,7 @@ def test_every_scene_of_an_ensemble_starts_at_its_own_offset():
 
 
 def test_drawing_shows_the_assembled_pose():
+    """``at_rest`` is the motion of one sample that a drawing shows."""
     scene = shifted(rack, "teeth", 0.05)
     assert np.array_equal(at_rest(scene).position, at_rest(mbref.assembled(scene)).position)
     assert mbref.still(scene) != mbref.still(rack())
