@@ -56,15 +56,13 @@ WELD = Scene(
 )
 
 
-NAMES = ("planar_slider_crank_gravity", "spatial_slider_crank_gravity", "spatial_slider_crank_driven")
-MECHANISMS = (*(SCENES[name]() for name in NAMES), RAIL, SLEEVE, WELD, TWO_GUIDES)
+MECHANISMS = (SCENES["spatial_slider_crank_gravity"](), RAIL, SLEEVE, WELD, TWO_GUIDES)
 
 
-@pytest.mark.parametrize(
-    "scene", [MECHANISMS[1], RAIL, SLEEVE, WELD, TWO_GUIDES], ids=lambda scene: scene.name
-)
-def test_motion_and_reactions_equal_those_of_the_dense_least_norm_solution(scene):
-    """A second formulation, by the pseudo-inverse; redundant rows share forces by the least norm in both."""
+@pytest.mark.parametrize("scene", MECHANISMS, ids=lambda scene: scene.name)
+def test_motion_and_reactions_by_alf_dual_equal_those_by_the_dense_pseudo_inverse(scene):
+    """MPI-SVD decides on the rank by singular values and leaves out no coordinate; redundant rows share
+    forces by the least norm in both. Positions agree to 1000 rtol (m), reactions to 1e-5 of the largest."""
     times = np.linspace(0.0, 0.1, 5)
     one = simulate(scene, METHOD, times, Limits(rtol=1e-11))
     other = simulate(scene, "mpi-svd+none", times, Limits(rtol=1e-11))
@@ -75,8 +73,9 @@ def test_motion_and_reactions_equal_those_of_the_dense_least_norm_solution(scene
         np.testing.assert_allclose(reaction, other.reactions[joint], atol=1e-5 * size, err_msg=joint)
 
 
-def test_driver_of_a_welded_joint_does_not_complete():
-    """The driver's angle 5 t² and rate are zero at the start, which is therefore consistent."""
+def test_driver_of_a_welded_joint_ends_the_run_before_it_turns_anything():
+    """The driver's angle 5 t² and rate are zero at the start, which is therefore consistent; after 1 ms the
+    angle would be 5e-6 rad."""
     scene = Scene(
         name="against",
         body=(block("a", 0.0), block("b", 1.0)),
@@ -89,16 +88,16 @@ def test_driver_of_a_welded_joint_does_not_complete():
         **GRAVITY,
     )
     run = simulate(scene, METHOD, [0.0, 0.2])
-    assert run.outcome.name != "COMPLETED", "the driver cannot turn what is welded"
+    assert run.outcome.label == "NOT_CONVERGED" and run.t_end < 1e-3, run.message
 
 
 @pytest.mark.parametrize("method", (METHOD, "lm2+projection/adams", "taylor"))
 def test_welded_body_stays_and_its_weld_carries_the_weight(method):
-    """2 kg at 1 m: 2 · 9.81 N along y."""
+    """A body of 2 kg: 2 · 9.81 N along y."""
     body = Body(name="b", position=(1, 0, 0), mass=2, inertia=(1, 2, 3))
     weld = Fixed(name="W", bodies=("ground", "b"), anchor=(0, 0, 0))
     scene = Scene(name="welded", gravity=(0, -9.81, 0), joint=(weld,), body=(body,))
     rest = simulate(scene, method, (0.0, 1.0))
     assert rest.outcome.name == "COMPLETED", rest.message
-    assert np.abs(rest.position[-1] - [[1, 0, 0]]).max() < 1e-13
-    assert abs(np.abs(rest.reactions["W"][-1, 1]) - 2 * 9.81) < 1e-9
+    assert np.abs(rest.position[-1] - [[1, 0, 0]]).max() < 1e-12  # m
+    assert np.abs(rest.reactions["W"][-1, 1]) == pytest.approx(2 * 9.81, rel=1e-12)

@@ -10,6 +10,8 @@ from mbref.scenes import find_scene
 from mbref.scenes.four_bar import four_bar_gravity, parallelogram
 from mbref.simulation.simulate import Limits, simulate
 
+RTOL = 1e-9
+
 
 def with_pendulum(scene: Scene) -> Scene:
     """Return a scene with a pendulum beside it that nothing connects with the rest."""
@@ -26,22 +28,23 @@ def test_motion_of_one_freedom_passes_all_its_singular_positions_on_the_smooth_b
     """The judge's closed form has one angle by the energy. A driven crank is flat every half turn, 4 times in
     12.5 rad; swings are flat 3 times in their duration; the heavy crank makes 61 half turns."""
     scene = find_scene(name)
-    run = simulate(scene, "taylor", np.linspace(0.0, scene.duration, 9), Limits(rtol=1e-9))
+    run = simulate(scene, "taylor", np.linspace(0.0, scene.duration, 9), Limits(rtol=RTOL))
     assert run.outcome.label == "COMPLETED", run.message
-    assert measure(scene, run, closed_form(scene))["error"] < 1e-8
+    assert measure(scene, run, closed_form(scene))["error"] < 10 * RTOL
     assert len(run.crossings) == crossings
 
 
 def test_parallelogram_moves_by_its_closed_form_through_three_crossings_beside_a_free_pendulum():
     """With the pendulum the scene has two degrees of freedom."""
     scene, times = four_bar_gravity(), np.linspace(0.0, 1.0, 9)
-    run = simulate(with_pendulum(scene), "taylor", times, Limits(rtol=1e-9))
+    run = simulate(with_pendulum(scene), "taylor", times, Limits(rtol=RTOL))
     assert run.outcome.label == "COMPLETED" and len(run.crossings) == 3
-    assert np.abs(run.position[:, :3] - closed_form(scene).poses(times).position).max() < 1e-8
+    assert np.abs(run.position[:, :3] - closed_form(scene).poses(times).position).max() < 10 * RTOL  # m
 
 
-def test_samples_just_after_a_crossing_are_right_at_a_loose_tolerance():
-    """Poses and accelerations 1 µs to 50 ms after the crossing, against the closed form."""
+def test_samples_just_after_a_crossing_meet_the_closed_form_at_a_loose_tolerance():
+    """1 µs to 50 ms after the crossing, with rtol 1e-4: poses to a tenth of it, accelerations to ten
+    times."""
     scene = four_bar_gravity()
     first = simulate(scene, "taylor", [1.0], Limits(rtol=1e-9)).crossings[0].time
     times = first + np.geomspace(1e-6, 5e-2, 40)
@@ -53,8 +56,8 @@ def test_samples_just_after_a_crossing_are_right_at_a_loose_tolerance():
 
 @pytest.mark.parametrize("rtol", [1e-3, 1e-4, 3e-5])
 def test_torsion_spring_on_a_crossing_parallelogram_moves_as_its_closed_form(rtol):
-    """The spring's angle continues through five crossings; high-accuracy steps there are of higher order than
-    the steps between them."""
+    """The closed form is the judge's. The spring's angle continues through five crossings; high-accuracy
+    steps there are of higher order than the steps between them."""
     scene = four_bar_gravity().with_(load=(TorsionSpring(joint="A", stiffness=1.0),))
     run = simulate(scene, "taylor", np.linspace(0.0, 3.0, 31), Limits(rtol=rtol))
     assert run.outcome.label == "COMPLETED" and len(run.crossings) == 5, run.message
@@ -72,9 +75,10 @@ def swung(rate: float) -> Scene:
 
 
 @pytest.mark.parametrize("rate", [1.0, 5.0, 20.0])
-def test_faster_start_is_ahead_by_between_half_and_all_of_the_bound_from_energy(rate):
-    """A start faster by ε is ahead, after a time T and one crossing, by at most ε x' T E₀ / E_least and at
-    least half of ε x' T E₀ / E_greatest, with the kinetic energies E of the motion."""
+def test_start_faster_by_a_millionth_is_ahead_within_the_bounds_from_the_kinetic_energy(rate):
+    """A start faster by ε = 1e-6 is ahead, after a time T and one crossing, by at most ε x' T E₀ / E_least,
+    with a thousandth of it for second order, and by at least half of ε x' T E₀ / E_greatest, with the kinetic
+    energies E of the motion."""
     change, times = 1e-6, np.linspace(0.0, 0.3 if rate < 20.0 else 0.1, 200)
     slow, fast = (
         simulate(swung(each), "taylor", times, Limits(rtol=1e-12)) for each in (rate, rate * (1.0 + change))

@@ -1,5 +1,5 @@
-"""Ensembles that are simulated together: results are bit-identical with single runs, also of runs that
-fail."""
+"""Ensembles that are simulated together: all numbers of a run (``results``) equal those of a single run to
+the bit, also if it fails."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def compared(scenes: list[Scene], times=TIMES, limits=LIMITS, method=METHOD) -> 
 
 
 def in_batches(scenes: list[Scene], times=TIMES, limits=LIMITS, method=METHOD) -> int:
-    """Return the number of runs computed together with the first one: all others, if none is apart."""
+    """Return the number of runs computed in one batch with a first run; others are computed one by one."""
     ended = run_all(scenes, method, times, limits)
     return sum(len(followed.places) for _, followed in ended.batches)
 
@@ -70,6 +70,7 @@ def bytes_of(crossing: Crossing) -> list:
     "name", ["planar_slider_crank", "spatial_slider_crank", "heavy_top", "flyball_governor"]
 )
 def test_variants_of_masses_and_gravity_together_equal_single_runs(name):
+    """Eleven of twelve variants are in a batch with the first one; all positions differ."""
     body = SCENES[name]().body[0].name
     varied = [Variation(f"body[{body}].mass", 0.5, 2.0), Variation("gravity[1]", -10.0, 10.0)]
     scenes = list(variants(SCENES[name](), varied, 12))
@@ -95,7 +96,8 @@ def test_variants_of_a_driven_scene_s_lengths_together_equal_single_runs():
     ],
 )
 def test_variants_of_places_together_equal_single_runs(name, path):
-    """Natural coordinates of all scenes are found at once."""
+    """Seven of eight variants are in a batch with the first one, though each has anchors or centres of its
+    own."""
     scene = SCENES[name]()
     mean = number_at(scene, path)
     scenes = list(variants(scene, [Variation(path, mean, 1e-5 * abs(mean), normal=True)], 8))
@@ -119,7 +121,8 @@ def test_variants_of_a_coupling_s_ratio_together_equal_single_runs():
 
 
 def test_variants_with_and_without_crossings_together_equal_single_runs():
-    """Some of the cranks are stopped before they reach the position in which rod and crank are in line."""
+    """Gravity of up to 400 m/s² along the guide stops some cranks before crank and rod are in line, and
+    others pass this position."""
     scenes = list(
         variants(SCENES["planar_slider_crank_equal"](), [Variation("gravity[0]", -400.0, 400.0)], 10)
     )
@@ -153,6 +156,7 @@ def test_variants_that_fail_or_complete_together_equal_single_runs():
 
 
 def test_random_mechanisms_in_random_order_together_equal_single_runs():
+    """Three variants of each of eight mechanisms: several batches, and their runs in another order."""
     scenes = []
     for seed in range(8):
         scene = random_mechanism(seed)
@@ -164,7 +168,9 @@ def test_random_mechanisms_in_random_order_together_equal_single_runs():
 
 
 @pytest.mark.parametrize("scenes", NUMBERS_DECIDE.values(), ids=NUMBERS_DECIDE.keys())
-def test_scenes_whose_numbers_decide_on_equations_together_equal_single_runs(scenes):
+def test_scenes_of_one_shape_with_different_independent_rows_together_equal_single_runs(scenes):
+    """Numbers of these scenes decide which rows are independent or at rest, as a force across the plane does
+    of a planar mechanism; each scene is there twice, in each order."""
     for order in permutations(range(len(scenes))):
         assert not compared([scenes[k] for k in order * 2]).differing
 
@@ -191,6 +197,7 @@ def test_variants_by_other_methods_together_equal_single_runs(method):
 
 
 def test_run_of_an_ensemble_is_equal_after_pickling():
+    """Also a run that was computed in a batch, here the second of four."""
     run, *_ = simulate_all(list(variants(CRANK, [MASS], 4)), METHOD, TIMES, LIMITS)[1:]
     sent = pickle.loads(pickle.dumps(run))
     assert results(sent) == results(run)
