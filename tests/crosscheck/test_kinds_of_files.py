@@ -17,6 +17,7 @@ from tests.crosscheck.test_importing import LUMP, hinge, read
 
 KINDS = Path(__file__).parent / "models" / "kinds"
 SAME = 1e-9  # of the largest distance moved, and of the largest entry of a matrix; worst measured 2e-11
+END = 0.02  # s, of the compared motions
 OPTIONS = {
     "close.urdf": ImportOptions(close=["fb=fc"]),
     "close_revolute.urdf": ImportOptions(close=["fb=fc:revolute:y"]),
@@ -98,9 +99,10 @@ def found(name: str) -> Source:
     ],
 )
 def test_imported_scene_moves_as_mujoco_s_model_of_the_file(name):
-    """The judge moves the scene; the file's masses, forces and rows by MuJoCo are integrated finely."""
+    """The judge moves the scene; the file's masses, forces and rows by MuJoCo are integrated finely, with the
+    controls of the last keyframe."""
     read_file = found(name)
-    assert apart(read_file.original, read_file, 0.02, read_file.original.nkey - 1) < SAME
+    assert apart(read_file.original, read_file, END, read_file.original.nkey - 1) < SAME
 
 
 @pytest.mark.parametrize("name", sorted(REFUSED))
@@ -143,16 +145,18 @@ def test_included_and_attached_bodies_are_imported_with_their_prefix(tmp_path):
     </worldbody></mujoco>"""
     read_file = read(tmp_path, both)
     assert [body.name for body in read_file.imported.scene.body] == ["arm", "left/arm"]
-    assert apart(read_file.original, read_file, 0.02) < SAME
+    assert apart(read_file.original, read_file, END) < SAME
 
 
 def test_straight_chain_is_closed_below_its_straight_line():
-    """The file's chain is straight at a height of 1 m, where it can close upward or downward: it falls."""
+    """The file's chain is straight at a height of 1 m and can close upward or downward. Gravity points down,
+    so that its joint C is closed below 1 m."""
     scene = found("connect_by_sites.xml").imported.scene
     assert scene.joint_named("C").anchor[2] < 1.0
 
 
 def test_missing_shape_files_are_named_in_the_notes():
+    """The file has masses, and three shapes and textures whose files do not exist."""
     notes = found("missing_mesh.xml").imported.notes
     assert "files that are missing: link1.stl, link2.obj, skin.png; these shapes have no effect" in notes
 

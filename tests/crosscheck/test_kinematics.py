@@ -1,4 +1,4 @@
-"""The judge's joint equations against finite differences of themselves and of their own rates."""
+"""The judge's joint equations / finite differences of themselves, and displacements put into poses."""
 
 import numpy as np
 import pytest
@@ -26,6 +26,11 @@ ROWS = {  # 6 minus the freedoms of the joint
     "inline": 2,
     "distance": 1,
 }
+
+
+ROUNDED = 1e-14  # m or rad; some roundings of lengths up to 1.4 m
+H = 1e-5  # s, half the interval of central differences
+SLOPE, SLOPE_OF_RATES = 4e-9, 2e-8  # ten times the errors of order H² measured, of Φ' and Φ''
 
 
 def tilted(*vector):
@@ -68,7 +73,7 @@ def test_joint_has_its_number_of_rows_and_no_residual_at_the_start(kind, bodies)
     scene = jointed(kind, bodies)
     residual = constraints.closure(scene, 0.0, *constraints.initial_poses(scene))["j"]
     assert residual.shape == (ROWS[kind],), f"{kind}: {residual.shape} rows, expected {ROWS[kind]}"
-    assert np.abs(residual).max() < 1e-14, f"{kind}: residual {residual} at t = 0, of lengths up to 1.4 m"
+    assert np.abs(residual).max() < ROUNDED, f"{kind}: residual {residual} at t = 0, of lengths up to 1.4 m"
 
 
 DRIVERS = {
@@ -87,13 +92,12 @@ def test_jacobian_is_finite_difference_of_closure(kind, bodies, driven):
     motion, rates = constrained_motion(scene, 3)
     j, b = constraints.jacobian(scene, 0.0, *motion[:2])
     direction = np.random.default_rng(5).normal(size=(len(scene.body), 6))
-    h = 1e-5
-    ends = [moved((*motion[:2], direction[:, :3], direction[:, 3:]), 0 * rates, s * h)[:2] for s in (1, -1)]
+    ends = [moved((*motion[:2], direction[:, :3], direction[:, 3:]), 0 * rates, s * H)[:2] for s in (1, -1)]
     plus, minus = (
-        constraints.closure(scene, s * h, *pose)["j"] for s, pose in zip((1, -1), ends, strict=True)
+        constraints.closure(scene, s * H, *pose)["j"] for s, pose in zip((1, -1), ends, strict=True)
     )
-    difference, predicted = (plus - minus) / (2 * h), j @ direction.ravel() - b
-    assert np.allclose(difference, predicted, atol=1e-8), f"{kind}: {difference} against {predicted}"
+    difference, predicted = (plus - minus) / (2 * H), j @ direction.ravel() - b
+    assert np.abs(difference - predicted).max() < SLOPE, f"{kind}: {difference} against {predicted}"
 
 
 @pytest.mark.parametrize("bodies", [PAIR, ("ground", "second")])
@@ -102,18 +106,18 @@ def test_acceleration_residual_is_finite_difference_of_velocity_residual(kind, b
     """Φ'' is the central difference of Φ' along a motion with random accelerations."""
     scene = jointed(kind, bodies, (DRIVERS[kind],) if driven else ())
     motion, rates = constrained_motion(scene, 11)
-    h = 1e-5
     plus, minus = (
-        constraints.closure_rates(scene, s * h, *moved(motion, rates, s * h))["j"] for s in (1, -1)
+        constraints.closure_rates(scene, s * H, *moved(motion, rates, s * H))["j"] for s in (1, -1)
     )
-    difference = (plus - minus) / (2 * h)
+    difference = (plus - minus) / (2 * H)
     residual = constraints.closure_accelerations(scene, 0.0, *motion, *rates)["j"]
-    assert np.allclose(difference, residual, atol=1e-7), f"{kind}: {difference} against {residual}"
+    assert np.abs(difference - residual).max() < SLOPE_OF_RATES, f"{kind}: {difference} against {residual}"
 
 
 @given(vector=st.tuples(*[st.floats(-1.7, 1.7)] * 3), shift=st.tuples(*[st.floats(-1, 1)] * 3))
 def test_fixed_joint_residual_is_the_displacement_put_in(vector, shift):
-    """A body is turned and shifted: the its residual's halves have the norms of shift (m) and angle (rad)."""
+    """A body is turned by up to 2.9 rad and shifted: the halves of its residual have the norms of the shift
+    (m) and of the rotation vector (rad)."""
     scene = jointed("fixed", ("ground", "second"))
     position, orientation = constraints.initial_poses(scene)
     turn = rotations.from_vector(np.array(vector))
@@ -124,12 +128,14 @@ def test_fixed_joint_residual_is_the_displacement_put_in(vector, shift):
     )
     residual = constraints.closure(scene, 0.0, *poses)["j"]
     sizes = [np.linalg.norm(part) for part in (residual[:3], residual[3:], shift, vector)]
-    assert np.allclose(sizes[:2], sizes[2:], atol=1e-12), f"measured {sizes[:2]}, put in {sizes[2:]}"
+    off = np.abs(np.subtract(sizes[:2], sizes[2:])).max()
+    assert off < 100 * ROUNDED, f"measured {sizes[:2]}, put in {sizes[2:]}"  # near half a turn it grows
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.4, 3.0, np.pi])
 def test_revolute_residual_is_the_tilt_of_its_axis(angle):
-    """The body is turned about a line perpendicular to the axis, through the anchor."""
+    """The body is turned about a line perpendicular to the axis, through the anchor: by an angle (rad) from
+    zero to half a turn, which is the norm of the residual's last rows."""
     scene = jointed("revolute", ("ground", "second"))
     position, orientation = constraints.initial_poses(scene)
     turn = rotations.from_vector(angle * np.array(SIDE) / np.linalg.norm(SIDE))
@@ -139,26 +145,27 @@ def test_revolute_residual_is_the_tilt_of_its_axis(angle):
         np.array([orientation[0], rotations.multiply(turn, orientation[1])]),
     )
     tilt = np.linalg.norm(constraints.closure(scene, 0.0, *poses)["j"][3:])
-    assert abs(tilt - angle) < 1e-8 * angle + 1e-15, f"tilt {tilt}, put in {angle}"
+    assert abs(tilt - angle) < ROUNDED, f"tilt {tilt}, put in {angle}"
 
 
-@pytest.mark.parametrize("name", [n for n in CLOSED if n != "four_bar_straight"])
+@pytest.mark.parametrize("name", CLOSED)
 def test_initial_velocities_satisfy_joints_and_drivers(name):
-    """Rates of their gaps are rounding: 4e-14 of the largest spin of a body, or of 1 rad/s."""
+    """Rates of their residuals are rounding, relative to the largest spin of a body, or to 1 rad/s."""
     scene = SCENES[name]()
     velocity, spin = constraints.initial_twists(scene)
     rates = constraints.closure_rates(scene, 0.0, *constraints.initial_poses(scene), velocity, spin)
     worst = {joint: np.abs(r).max() for joint, r in rates.items()}
-    assert max(worst.values()) < 4e-14 * max(1.0, np.abs(spin).max()), f"{name}: {worst}"
+    assert max(worst.values()) < 4 * ROUNDED * max(1.0, np.abs(spin).max()), f"{name}: {worst}"
 
 
 @pytest.mark.parametrize("name", [n for n in CLOSED if SCENES[n]().body[0].angular_velocity is not None])
 def test_initial_velocities_keep_given_angular_velocities(name):
+    """Angular velocities of the scene file, which its joints allow, change by rounding only."""
     scene = SCENES[name]()
     _, spin = constraints.initial_twists(scene)
     given = {k: body.angular_velocity for k, body in enumerate(scene.body) if body.angular_velocity}
-    gap = np.abs(spin[list(given)] - list(given.values())).max()
-    assert gap < 1e-13 * max(1.0, np.abs(spin).max())
+    change = np.abs(spin[list(given)] - list(given.values())).max()
+    assert change < 10 * ROUNDED * max(1.0, np.abs(spin).max())
 
 
 def test_initial_velocities_that_are_not_given_minimise_the_kinetic_energy():
@@ -194,10 +201,20 @@ def test_second_driver_of_a_four_bar_at_another_rate_is_refused():
 
 @pytest.mark.parametrize("order", [("ground", "second"), ("second", "ground")])
 def test_joint_coordinates_count_the_turns_put_in(order):
-    """A body turns about its axis by 21 rad and slides by 1.6 m. Samples 0.5 s apart, between which it turns
-    by more than half a turn, leave the angle undetermined (NaN)."""
+    """A body turns about its axis by 9 t + 3 sin 4 t, up to 21 rad, and slides by 0.4 t², up to 1.6 m."""
+    got, wanted = cylinder_coordinates(order, np.linspace(0.0, 2.0, 81))
+    assert np.abs(got - wanted).max() < 100 * ROUNDED, f"off by {np.abs(got - wanted).max()} after 21 rad"
+
+
+def test_angle_is_undetermined_if_a_body_turns_by_over_half_a_turn_between_samples():
+    """Samples 0.5 s apart, between which the body turns by 4.5 rad and more: the angle is NaN."""
+    got, _ = cylinder_coordinates(("ground", "second"), np.linspace(0.0, 2.0, 5))
+    assert np.isnan(got[-1, 0]), got
+
+
+def cylinder_coordinates(order, times):
+    """The judge's coordinates (k, 2) of a cylindrical joint and those put in: angle (rad), shift (m)."""
     scene = jointed("cylindrical", order)
-    times = np.linspace(0.0, 2.0, 81)
     angle, shift = 9.0 * times + 3 * np.sin(4 * times), 0.4 * times**2
     axis = np.array(AXIS) / np.linalg.norm(AXIS)
     turn = rotations.from_vector(angle[:, None] * axis)
@@ -209,7 +226,4 @@ def test_joint_coordinates_count_the_turns_put_in(order):
     spin = np.stack([0 * place, (9.0 + 12 * np.cos(4 * times))[:, None] * axis], axis=1)
     sign = 1 if order[0] == "ground" else -1
     got = constraints.joint_coordinates(scene, times, poses, frames, spin)["j"]
-    wanted = sign * np.stack([angle, shift], axis=1)
-    assert np.abs(got - wanted).max() < 1e-12, f"off by {np.abs(got - wanted).max()} after {angle[-1]} rad"
-    sparse = constraints.joint_coordinates(scene, times[::20], poses[::20], frames[::20], spin[::20])["j"]
-    assert np.isnan(sparse[-1, 0]), f"samples {times[20]} s apart cannot tell the turn, got {sparse[-1, 0]}"
+    return got, sign * np.stack([angle, shift], axis=1)

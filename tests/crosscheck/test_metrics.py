@@ -40,12 +40,14 @@ def test_violation_of_an_angle_is_the_angle_put_in():
 
 
 def test_work_of_a_moment_across_the_turning_axis_is_its_power_integrated():
-    """The truth has no drift except for the quadrature of the power between samples, of fourth order."""
+    """The truth's energy minus work drifts by the quadrature of the power between samples alone, by a cubic
+    spline: with the fourth power of their distance, and by 3.7e-10 of the energy at 160 intervals."""
     scene = pendulum(gravity=(0.0, -9.81, 0.0), load=(Moment(body="bar", moment=(1.0, 0.0, 2.5)),))
     truth = truth_for(scene)
     drifts = [energy_series(scene, truth.poses(np.linspace(0, 1, n + 1))).max() for n in (40, 80, 160)]
     orders = [math.log2(a / b) for a, b in itertools.pairwise(drifts)]
-    assert drifts[-1] < 1e-8 and min(orders) > 3.3, f"drifts {drifts}, orders {orders}"
+    assert drifts[-1] < MARGIN * 3.7e-10, f"drifts {drifts}"
+    assert orders == pytest.approx([4.0, 4.0], abs=0.3), f"orders {orders}"
 
 
 def test_work_of_a_moment_on_a_free_body_is_its_power_integrated():
@@ -56,24 +58,30 @@ def test_work_of_a_moment_on_a_free_body_is_its_power_integrated():
 
 
 def test_energy_error_is_none_if_bodies_turn_six_times_between_samples():
-    """The work of the moment on the crank is then unknown."""
+    """The crank turns at up to 600 rad/s, so that samples 50 ms apart leave the work of its moment unknown;
+    at samples 1 ms apart the truth's energy error is rounding."""
     scene = SCENES["planar_slider_crank"]()
-    sparse = truth_for(scene).poses(np.linspace(0, 0.4, 9))
+    sparse, dense = (truth_for(scene).poses(np.linspace(0, 0.4, count)) for count in (9, 401))
     assert measure(scene, sparse)["energy_error"] is None
+    assert measure(scene, dense)["energy_error"] < MARGIN * 5.2e-16
 
 
 @pytest.mark.parametrize("name", ["four_bar", "spatial_slider_crank_driven"])
 def test_energy_error_is_none_for_a_driven_scene(name):
-    """The work of the driver is unknown."""
+    """The work of the driver is unknown; without the driver the motion has an energy error."""
     scene = SCENES[name]()
-    assert measure(scene, truth_for(scene).poses(np.linspace(0, 0.1, 5)))["energy_error"] is None
+    motion = truth_for(scene).poses(np.linspace(0, 0.1, 41))
+    assert measure(scene, motion)["energy_error"] is None
+    assert measure(scene.with_(driver=()), motion)["energy_error"] is not None
 
 
 def test_energy_error_is_none_for_a_damped_scene():
-    """The work of the damper is unknown."""
+    """The work of the damper is unknown; without the damper the motion has an energy error."""
     scene = SPRUNG["block_spring"]
     damped = scene.with_(load=(scene.load[0].model_copy(update={"damping": 1.0}),))
-    assert measure(damped, truth_for(damped).poses(np.linspace(0, 1, 50)))["energy_error"] is None
+    motion = truth_for(damped).poses(np.linspace(0, 1, 50))
+    assert measure(damped, motion)["energy_error"] is None
+    assert measure(scene, motion)["energy_error"] is not None
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
@@ -87,6 +95,7 @@ def test_states_that_are_not_finite_have_infinite_errors(value):
 
 
 def test_only_metrics_of_the_error_are_none_without_a_truth():
+    """Violations and the energy error follow from the run and the scene alone."""
     found = measure(SCENE, EXACT)
     missing = {name for name, value in found.items() if value is None}
     of_truth = {
@@ -103,12 +112,13 @@ def test_only_metrics_of_the_error_are_none_without_a_truth():
 
 
 def test_metrics_do_not_depend_on_the_order_of_bodies():
+    """The run's bodies are listed in another order than the scene's; sums differ by rounding."""
     order = [2, 0, 1]
     keys = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
     shuffled = replace(
         EXACT, bodies=tuple(EXACT.bodies[i] for i in order), **{k: getattr(EXACT, k)[:, order] for k in keys}
     )
-    assert measure(SCENE, shuffled, TRUTH) == pytest.approx(measure(SCENE, EXACT, TRUTH), abs=1e-15)
+    assert measure(SCENE, shuffled, TRUTH) == pytest.approx(measure(SCENE, EXACT, TRUTH), abs=1e-14)
 
 
 def test_run_of_a_body_that_the_scene_lacks_is_refused():
@@ -118,7 +128,8 @@ def test_run_of_a_body_that_the_scene_lacks_is_refused():
 
 @pytest.mark.parametrize("order", [0.75, 1, 2, 4, 8])
 def test_order_of_convergence_is_the_power_put_in_above_a_floor(order):
-    """3 h^p with 10 % scatter, down to a floor of 1e-13; the first error is not asymptotic."""
+    """Errors 3 h^p with 10 % scatter, down to a floor of 1e-13; the first error is not asymptotic. The
+    scatter moves the fitted order by less than 0.1."""
     steps = 0.5 / 2.0 ** np.arange(12)
     scatter = 1 + 0.1 * np.sin(7 * np.arange(12))
     errors = np.maximum(3 * steps**order * scatter, 1e-13)
@@ -133,20 +144,33 @@ def test_order_of_convergence_is_the_power_put_in_above_a_floor(order):
     ids=["two runs", "rounding", "scatter", "no finite error"],
 )
 def test_errors_that_follow_no_power_have_no_order_of_convergence(errors):
+    """Errors 1e-2, 1e-3 and 1e-4 of halved steps have one, log₂ 10."""
+    assert order_of_convergence([0.1, 0.05, 0.025], [1e-2, 1e-3, 1e-4]) == pytest.approx(math.log2(10))
     assert order_of_convergence([0.1, 0.05, 0.025, 0.0125][: len(errors)], errors) is None
 
 
-def test_cost_is_read_on_the_lower_envelope():
-    costs, errors = [1.0, 10.0, 100.0, 50.0], [1e-2, 1e-4, 1e-6, 1e-3]  # error = 1e-2 / cost²; one is beaten
-    got = cost_at_error(costs, errors, 1e-5)
-    assert got == pytest.approx(10**1.5), f"measured {got}, the line has {10**1.5}"
-    assert cost_at_error(costs, errors, 0.5) == 1.0, "the cheapest run is already better"
-    assert cost_at_error(costs, errors, 1e-7) is None, "no run is so good"
+COSTS, ERRORS = [1.0, 10.0, 100.0, 50.0], [1e-2, 1e-4, 1e-6, 1e-3]  # error = 1e-2 / cost²; the last is worse
+
+
+@pytest.mark.parametrize(
+    ("level", "cost"),
+    [(1e-5, 10**1.5), (0.5, 1.0), (1e-7, None)],
+    ids=["between two runs", "above the cheapest run's error", "below all errors"],
+)
+def test_cost_at_an_error_is_read_on_the_lower_envelope_of_the_runs(level, cost):
+    """Between runs on the line error = 1e-2 / cost² (cost = √(1e-2 / level)); a worse run has no effect. The
+    cheapest run costs 1; no run reaches 1e-7."""
+    got = cost_at_error(COSTS, ERRORS, level)
+    assert got is cost is None or got == pytest.approx(cost), f"measured {got}, the line has {cost}"
+
+
+def test_runs_without_a_finite_error_have_no_cost_at_an_error():
     assert cost_at_error([1.0, 2.0], [math.nan, math.inf], 1.0) is None
 
 
 def test_energy_error_is_none_for_a_mechanism_at_rest():
-    """A bar that hangs still has only rounding, of 1e-16 m and m/s, as energy and as change of energy."""
+    """A bar that hangs at rest has only rounding, of 1e-16 m and m/s, as energy and as change of energy; one
+    that moves at 1 m/s has an energy error."""
     scene = pendulum(gravity=(0.0, -9.81, 0.0))
     times = np.linspace(0.0, 1.0, 5)
     noise = 1e-16 * np.random.default_rng(0).standard_normal((5, 1, 3))
@@ -164,6 +188,7 @@ def test_energy_error_is_none_for_a_mechanism_at_rest():
         noise,
     )
     assert energy_series(scene, rest) is None
+    assert energy_series(scene, replace(rest, velocity=noise + 1.0)) is not None
 
 
 def test_error_of_a_run_beyond_the_truth_is_measured_to_its_end():
