@@ -18,58 +18,68 @@ from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref.formats import ImportOptions
-from mbref.scene import Factor, Scene, SceneError, TorsionSpring
+from mbref.motions.trajectory import Outcome
+from mbref.scene import Factor, JointForce, JointTorque, Scene, SceneError, SlideSpring, TorsionSpring
 from mbref.scenes import SCENES
+from tests.crosscheck.measured import MARGIN, ROUNDING
 from tests.helpers import loads_over_time as scenes
 from tests.helpers.loads_over_time import AXIS
 
 TIMES = np.array([0.0, 0.3, 0.8, 0.9, 1.3, 1.45, 2.0])
 FORMULATIONS = {"A": natural_motion, "B": lambda *args: tree_motion(*args, seconds=100.0)}
-PROBES = {name: scene for name, scene in feature_scenes().items() if "time" in name or "_" in name}
-
-
+PROBES = feature_scenes()  # "joint_force load", ...: a body on a joint with this load and gravity
 ROUNDED = 1e-15  # m: positions of up to 1 m, integrated in long double and rounded to double
+MEASURED = {  # largest difference of positions (m), and of accelerations (of the largest) from the reference
+    "mujoco": (ROUNDING, 4.7e-14),
+    "exudyn": (1.7e-13, 2.6e-9),
+    "pinocchio": (4.7e-13, 3.3e-12),
+    "dart": (4.7e-13, 3.3e-12),
+    "drake": (1e-11, 1e-9),
+}
 
 
-@pytest.mark.parametrize("name", FORMULATIONS)
-def test_reference_formulations_move_joint_loads_as_the_closed_forms(name):
-    """A sprung and damped slide, a slide under a force that is switched, and a wheel under a sinusoidal
-    torque, whose angle is compared modulo a full turn (rad, up to 4 roundings)."""
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize(
+    ("scene", "displacement"),
+    [(scenes.sprung_slide(), scenes.sprung_displacement), (scenes.thrown(), scenes.switched)],
+    ids=["damped spring", "force switched on and off"],
+)
+def test_reference_formulations_displace_a_block_by_its_closed_form(formulation, scene, displacement):
+    """A damped oscillator from rest, and a cubic of time as acceleration from 0.5 s to 1.5 s, integrated."""
+    motion = FORMULATIONS[formulation](scene, TIMES, EXTENDED)
+    assert not motion.reason
+    moved = (doubles(motion.position[:, 0]) - scene.body[0].position) @ AXIS
+    assert np.abs(moved - displacement(TIMES)).max() < ROUNDED
 
-    def moved(scene: Scene) -> np.ndarray:
-        motion = FORMULATIONS[name](scene, TIMES, EXTENDED)
-        assert not motion.reason
-        return doubles(motion.position[:, 0])
 
-    start = np.array(scenes.sprung_slide().body[0].position)
-    along = (moved(scenes.sprung_slide()) - start) @ AXIS
-    assert np.abs(along - scenes.sprung_displacement(TIMES)).max() < ROUNDED
-    assert np.abs(moved(scenes.thrown()) @ AXIS - scenes.switched(TIMES)).max() < ROUNDED
-    motion = FORMULATIONS[name](scenes.wheel(), TIMES, EXTENDED)
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_reference_formulations_turn_a_wheel_by_its_closed_form(formulation):
+    """φ'' = M A sin(ω t + p) / I from rest, integrated twice; up to 1.2 rad."""
+    motion = FORMULATIONS[formulation](scenes.wheel(), TIMES, EXTENDED)
+    assert not motion.reason
     turned = 2 * np.arctan2(*doubles(motion.orientation)[:, 0, [3, 0]].T)
-    apart = turned - scenes.turned(TIMES)
-    assert np.abs(apart - 2 * np.pi * np.round(apart / 2 / np.pi)).max() < 4 * ROUNDED
+    assert np.abs(turned - scenes.turned(TIMES)).max() < ROUNDED
 
 
-def test_motion_under_constant_joint_loads_keeps_its_energy():
-    """Undamped springs, constant forces and constant torques of joints have a potential."""
-    scene = scenes.arm()
-    still = [
-        load.model_copy(update={"damping": 0.0} if load.action.stiffness else {"factor": None})
-        for load in scene.load
-        if hasattr(load, "joint")
+def test_energy_stays_under_constant_forces_and_undamped_springs_of_joints():
+    """T + V of the judge's motion by Gauss's principle, with T up to 0.7 J: V has k x² / 2 of the springs of
+    a cylindrical joint, and -F x and -M φ of its force and torque. The measured drift is 1.7e-9 J."""
+    constant = [
+        SlideSpring(joint="C", stiffness=30.0, natural_displacement=0.05),
+        TorsionSpring(joint="C", stiffness=0.2, natural_angle=0.4),
+        JointForce(joint="C", force=2.0),
+        JointTorque(joint="C", torque=-0.3),
     ]
-    scene = scene.with_(load=still)
+    scene = scenes.arm().with_(load=constant)
     motion = gauss_motion(scene, tuple(np.linspace(0.0, 1.0, 41)))
-    assert energy_drift(scene, motion).max() < 1e-8
-    assert energy_drift(scenes.arm(), motion) is None, "dampers and loads over time have no potential"
+    assert energy_drift(scene, motion).max() < MARGIN * 1.7e-9
 
 
 @pytest.mark.parametrize("name", ("slide_spring load", "joint_torque load", "joint_force load"))
-@pytest.mark.parametrize(("of", "within"), [("mujoco", 1e-12), ("exudyn", 1e-10), ("pinocchio", 1e-10)])
-def test_engine_moves_joint_loads_as_the_reference(of, within, name):
-    """A spring, torque or force of a joint; ``within`` is the allowed difference (m)."""
-    assert gap(of, PROBES[name]) < within
+@pytest.mark.parametrize("of", ["mujoco", "exudyn", "pinocchio"])
+def test_engine_moves_joint_loads_as_the_reference(of, name):
+    """MEASURED has the differences of positions and accelerations; 10 times as much is allowed."""
+    assert differences_over_limits(of, PROBES[name]) < 1
 
 
 SMOOTH = ("slide_spring load", "joint_torque load", "joint_force load", "polynomial loads over time")
@@ -78,9 +88,10 @@ SMOOTH = ("slide_spring load", "joint_torque load", "joint_force load", "polynom
 @pytest.mark.parametrize("name", SMOOTH)
 @pytest.mark.parametrize("on_terms", ["drake", "dart"])
 def test_integrated_accelerations_of_drake_and_dart_move_joint_loads_as_the_reference(on_terms, name):
-    """Crosscheck integrates the accelerations of their own mass matrices and forces."""
+    """Crosscheck integrates the accelerations of their own mass matrices and forces. MEASURED has the
+    differences of positions and accelerations; 10 times as much is allowed."""
     pytest.importorskip({"drake": "pydrake", "dart": "dartpy"}[on_terms])
-    assert gap(on_terms, PROBES[name].with_(duration=0.2)) < 1e-10
+    assert differences_over_limits(on_terms, PROBES[name].with_(duration=0.2)) < 1
 
 
 @pytest.mark.parametrize("name", SMOOTH)
@@ -93,7 +104,8 @@ def test_integrated_accelerations_of_drake_and_dart_move_joint_loads_as_the_refe
     ],
 )
 def test_first_order_steps_with_joint_loads_converge_to_the_reference(of, module, family, options, name):
-    """A tenth of the step leaves at most a fifth of the error; a lost or reversed load would leave all."""
+    """A tenth of the step leaves at most a fifth of the error, below a thousandth of the way moved (measured
+    5.5e-4); a lost or reversed load would leave all."""
     pytest.importorskip(module)
     scene, times = PROBES[name].with_(duration=0.2), np.array([0.0, 0.2])
     exact = doubles(natural_motion(scene, times, EXTENDED).position)
@@ -102,7 +114,7 @@ def test_first_order_steps_with_joint_loads_converge_to_the_reference(of, module
         np.abs(engine(of).run(scene, times, Setting(family, {"step": h, **options})).position - exact).max()
         for h in (1e-3, 1e-4)
     )
-    assert fine < 1e-3 * moved and fine < 0.2 * coarse + 1e-9, (coarse, fine, moved)
+    assert fine < 1e-3 * moved and fine < 0.2 * coarse, (coarse, fine, moved)
 
 
 def test_hinge_with_a_load_keeps_its_coordinate_when_a_loop_is_cut():
@@ -118,31 +130,35 @@ def test_hinge_with_a_load_keeps_its_coordinate_when_a_loop_is_cut():
 
 @pytest.mark.parametrize("kind", FACTORS)
 def test_mujoco_moves_loads_over_time_as_the_reference(kind):
-    assert gap("mujoco", PROBES[f"{kind} loads over time"].with_(duration=0.12)) < 1e-11
+    """Forces and moments times a polynomial, sine, table or switch; 10 times MEASURED is allowed."""
+    assert differences_over_limits("mujoco", PROBES[f"{kind} loads over time"].with_(duration=0.12)) < 1
 
 
 def test_exudyn_moves_polynomial_loads_over_time_as_the_reference():
-    assert gap("exudyn", PROBES["polynomial loads over time"].with_(duration=0.1)) < 1e-10
+    """10 times the differences of MEASURED are allowed."""
+    assert differences_over_limits("exudyn", PROBES["polynomial loads over time"].with_(duration=0.1)) < 1
 
 
-def gap(name: str, scene: Scene) -> float:
-    """Return the largest difference of positions by an engine's best setting from the reference (m), or a
-    hundredth of that of accelerations, over the largest one and at least 1 m/s², if that is larger."""
+def differences_over_limits(name: str, scene: Scene) -> float:
+    """Return the larger difference, of positions (m) or of accelerations / the largest one and at least 1
+    m/s², of an engine's best setting from the reference, over MARGIN times the measured one."""
     times, simulator = np.linspace(0.0, scene.duration, 4), engine(name)
     run = simulator.run(scene, times, simulator.best_settings(scene)[-1])
     exact = natural_motion(scene, times, EXTENDED)
-    assert run.outcome.name == "COMPLETED"
-    largest = np.abs(doubles(exact.acceleration)).max()
-    off = np.abs(run.acceleration - doubles(exact.acceleration)).max() / max(largest, 1.0)
-    return max(np.abs(run.position - doubles(exact.position)).max(), off / 100)
+    assert run.outcome is Outcome.COMPLETED and not exact.reason, run.message
+    place, change = (doubles(getattr(exact, field)) for field in ("position", "acceleration"))
+    off = np.abs(run.position - place).max()
+    change_off = np.abs(run.acceleration - change).max() / max(np.abs(change).max(), 1.0)
+    return max(off / MEASURED[name][0], change_off / MEASURED[name][1]) / MARGIN
 
 
-def test_engines_refuse_functions_of_time_that_they_lack():
-    """Pinocchio's adapter maps none, Exudyn's polynomials only; MuJoCo's maps all."""
-    assert not engine("mujoco").cannot(PROBES["table loads over time"])
-    for name, kind in (("pinocchio", "sine"), ("exudyn", "table"), ("exudyn", "switched")):
-        refused = engine(name).cannot(PROBES[f"{kind} loads over time"])
-        assert refused.owner is Owner.ADAPTER and "load[0]" in refused.reason
+@pytest.mark.parametrize(
+    ("name", "kind"), [("pinocchio", "sine"), ("exudyn", "table"), ("exudyn", "switched")]
+)
+def test_adapter_refuses_a_function_of_time_that_it_does_not_map(name, kind):
+    """Pinocchio's adapter maps none, Exudyn's polynomials only. The refusal names the load."""
+    refused = engine(name).cannot(PROBES[f"{kind} loads over time"])
+    assert refused.owner is Owner.ADAPTER and "load[0]" in refused.reason
 
 
 MOTORS = """<mujoco><option timestep="0.001" integrator="RK4"/><worldbody>
@@ -162,7 +178,7 @@ def read(tmp_path: Path, text: str, **options: object):
 
 def test_slide_springs_and_keyframe_motors_are_imported_as_loads(tmp_path):
     """Torque = gear 20 · ctrl 0.05 = 1 N m. Force = gain 3 · gear -2 · ctrl 4, clipped to 1, = -6 N.
-    The scene moves as MuJoCo's RK4 moves the model; without the keyframe no motor acts."""
+    The scene moves as MuJoCo's RK4 with 500 steps of 1 ms moves the model, to 1e-9 m."""
     plain = MOTORS.replace("SERVO", "").replace("SERVED", "")
     scene = read(tmp_path, plain, keyframe="on").scene
     found = {load.type: load for load in scene.load}
@@ -175,7 +191,13 @@ def test_slide_springs_and_keyframe_motors_are_imported_as_loads(tmp_path):
     mujoco.mj_forward(model, data)
     exact = natural_motion(scene, np.array([0.0, 0.5]), EXTENDED)
     assert np.abs(doubles(exact.position)[-1] - data.xipos[1:]).max() < 1e-9
-    assert not {"joint_torque", "joint_force"} & {load.type for load in read(tmp_path, plain).scene.load}
+
+
+def test_motors_without_a_keyframe_are_no_loads(tmp_path):
+    """Of the file's loads only the spring and the damper of its joints remain."""
+    plain = MOTORS.replace("SERVO", "").replace("SERVED", "")
+    loads = read(tmp_path, plain).scene.load
+    assert sorted(load.type for load in loads) == ["slide_spring", "torsion_spring"]
 
 
 def test_servo_with_a_force_range_is_refused_by_name_or_left_out(tmp_path):
@@ -190,7 +212,8 @@ def test_servo_with_a_force_range_is_refused_by_name_or_left_out(tmp_path):
 
 
 def test_joint_loads_return_from_exported_mjcf_with_their_motion(tmp_path):
-    """Motors are written with keyframe "loads"; the notes say this, and that a load over time is left out."""
+    """Motors are written with keyframe "loads", which the notes say. Both scenes move alike by the
+    reference."""
     plain = MOTORS.replace("SERVO", "").replace("SERVED", "")
     scene = read(tmp_path, plain, keyframe="on").scene
     exported = FORMAT.write(scene)
@@ -199,6 +222,11 @@ def test_joint_loads_return_from_exported_mjcf_with_their_motion(tmp_path):
     kinds = sorted(load.type for load in scene.load)
     assert sorted(load.type for load in again.load) == kinds
     motions = [natural_motion(each, np.array([0.0, 0.5]), EXTENDED) for each in (scene, again)]
-    assert np.abs(doubles(motions[0].position - motions[1].position)).max() < 1e-9
-    timed = scene.with_("load[2].factor", Factor(start=0.2))
+    assert np.abs(doubles(motions[0].position - motions[1].position)).max() < 100 * ROUNDED
+
+
+def test_load_over_time_is_left_out_of_exported_mjcf_with_a_note(tmp_path):
+    """A motor's load is switched on at 0.2 s."""
+    plain = MOTORS.replace("SERVO", "").replace("SERVED", "")
+    timed = read(tmp_path, plain, keyframe="on").scene.with_("load[2].factor", Factor(start=0.2))
     assert "MJCF has no loads over time" in " ".join(FORMAT.write(timed).left_out)

@@ -10,11 +10,14 @@ from mbref.scene import GROUND, Body, Distance, Revolute, Scene
 from mbref.scenes import SCENES
 from tests.helpers.coupled_mechanisms import coupled_loops, gear_pair, pendulum, screw
 
+# names of built-in scenes with and without redundant rows
 NAMES = ("planar_slider_crank", "four_bar", "bennett", "sarrus", "five_bar_gravity", "andrews_squeezer")
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_built_in_scenes_have_the_counts_of_mbref(name):
+def test_judge_s_rank_of_a_built_in_scene_gives_the_counts_of_mbref(name):
+    """Rows, redundant rows and degrees of freedom: the judge counts by singular values of its own constraint
+    matrix, mbref by elimination of its own rows."""
     scene = SCENES[name]()
     counts, found = mbref.counts(scene), mobility(scene)
     assert found == (counts.rows, counts.redundant, counts.degrees_of_freedom)
@@ -22,7 +25,8 @@ def test_built_in_scenes_have_the_counts_of_mbref(name):
 
 @pytest.mark.parametrize("make", [gear_pair, screw, pendulum, coupled_loops])
 def test_coupling_is_a_constraint_row_and_an_armature_is_none(make):
-    """mbref's hidden rotors add six coordinates and six rows each, and no freedom."""
+    """The judge's count is mbref's without the rotors: mbref models an armature by a hidden body with six
+    coordinates and six rows."""
     scene = make()
     counts, found = mbref.counts(scene), mobility(scene)
     rotors = sum(bool(joint.armature) for joint in scene.joint if hasattr(joint, "armature"))
@@ -31,7 +35,8 @@ def test_coupling_is_a_constraint_row_and_an_armature_is_none(make):
 
 
 def test_mobility_of_four_small_scenes_is_as_counted_by_hand():
-    """(rows, redundant rows, freedoms) of a free body, a pendulum, a boom on a rope, and a doubled hinge."""
+    """(rows, redundant rows, freedoms): a free body; a pendulum, by five rows; a boom that a rope holds; a
+    hinge and its copy, whose five rows are redundant."""
     body = Body(name="rod", mass=1.0, inertia=(0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))
     free = Scene(name="free", body=[body])
     hinge = Revolute(name="A", bodies=(GROUND, "rod"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0))

@@ -22,6 +22,7 @@ SECOND = Body(
 PIN = Distance(name="D", bodies=("a", "b"), anchors=((0.0, 0.0, 0.0), (3.0, 0.0, 0.0)))
 SCENE = Scene(name="free", body=(FIRST, SECOND), duration=1.0)
 TIMES = np.array([0.0, 0.5, 1.0])
+ROUNDED = 1e-15  # of momentum, relative: exact sums of few numbers
 
 
 def motion() -> Trajectory:
@@ -36,38 +37,39 @@ def motion() -> Trajectory:
 
 
 def test_angular_momentum_drift_is_relative_to_spin_and_linear_momentum():
-    """5 kg m² at 2 rad/s gain 0.7 rad/s: 3.5 N m s over the spin's 13.5 and 6 kg m/s times the length."""
+    """Body b, 5 kg m² at 2 rad/s, gains 0.7 rad/s at one sample: 3.5 N m s. The scale is its largest spin,
+    13.5 N m s, and the momentum of body a, 6 kg m/s, times the scene's length."""
     run = motion()
     run.angular_velocity[1, 1, 2] += 0.7
     found = momentum_series(SCENE, run)
-    assert found[1] == pytest.approx(3.5 / (13.5 + 6.0 * scene_length(SCENE))) and found[2] < 1e-15
+    assert found[1] == pytest.approx(3.5 / (13.5 + 6.0 * scene_length(SCENE))) and found[2] < ROUNDED
 
 
 def test_momentum_drift_of_turning_in_place_is_relative_to_the_spin():
     """Body a rests, body b turns: 5 kg m² at 2 rad/s gain 1 rad/s, which is 5 of 15 N m s."""
-    still = SCENE.with_(body=(FIRST.model_copy(update={"velocity": None}), SECOND), joint=(PIN,))
+    turning = SCENE.with_(body=(FIRST.model_copy(update={"velocity": None}), SECOND), joint=(PIN,))
     run = motion()
     run.position[:, 0, 0], run.velocity[:] = 0.0, 0.0
-    assert momentum_series(still, run).max() < 1e-15
+    assert momentum_series(turning, run).max() < ROUNDED
     run.angular_velocity[2, 1, 2] += 1.0
-    assert momentum_series(still, run)[2] == pytest.approx(5.0 / 15.0)
+    assert momentum_series(turning, run)[2] == pytest.approx(5.0 / 15.0)
 
 
 def test_impulses_of_gravity_forces_and_moments_are_no_drift():
-    """Gravity of 1 m/s² gives each body a velocity t; 5 N m give body b a spin t; 6 N give body a a velocity
-    of 3 t. With a force, whose arm moves, angular momentum is not judged."""
+    """Gravity of 1 m/s² gives each body a velocity t, which is a drift if the scene has no gravity; 5 N m
+    give body b a spin t; 6 N give body a a velocity of 3 t."""
     run = motion()
     fall = np.zeros((3, 2, 3))
     fall[:, :, 2] = -TIMES[:, None]
     run = replace(run, velocity=run.velocity + fall, position=run.position + fall * TIMES[:, None, None] / 2)
-    assert momentum_series(SCENE.with_(gravity=(0.0, 0.0, -1.0)), run).max() < 1e-15
+    assert momentum_series(SCENE.with_(gravity=(0.0, 0.0, -1.0)), run).max() < ROUNDED
     assert momentum_series(SCENE, run).max() > 0.1
     pushed = SCENE.with_(gravity=(0.0, 0.0, -1.0), load=(Moment(body="b", moment=(0.0, 0.0, 5.0)),))
     run.angular_velocity[:, 1, 2] += TIMES
-    assert momentum_series(pushed, run).max() < 1e-15
+    assert momentum_series(pushed, run).max() < ROUNDED
     forced = pushed.with_(load=(Force(body="a", force=(0.0, 6.0, 0.0), point=(0.0, 0.0, 0.0)),))
     run.velocity[:, 0, 1] += 3.0 * TIMES
-    assert momentum_series(forced, run).max() < 1e-15
+    assert momentum_series(forced, run).max() < ROUNDED
 
 
 @pytest.mark.parametrize(
@@ -90,17 +92,21 @@ def test_impulses_of_gravity_forces_and_moments_are_no_drift():
     ids=["joint to the ground", "spring to the ground", "load over time", "no masses"],
 )
 def test_scene_without_a_momentum_balance_has_no_drift(change):
+    """None stands for no drift; the two free bodies, without the change, have one."""
+    assert momentum_series(SCENE, motion()) is not None
     assert momentum_series(SCENE.with_(**change), motion()) is None
 
 
 def test_run_at_rest_has_no_momentum_drift():
+    """No momentum of the motion could be the scale: None stands for no drift."""
     run = motion()
     run.velocity[:], run.angular_velocity[:] = 0.0, 0.0
     assert momentum_series(SCENE, run) is None
 
 
 def test_stored_violation_states_its_numbers_and_the_command_that_repeats_it(tmp_path):
-    """Comments of the scene file have check, measured and allowed value, and the command."""
+    """Comments of the scene file have check, measured and allowed value, and the command, which names this
+    file or, for a probe of the suite, the probe."""
     verdict = Verdict("truth", "free", FAIL, 0.25, 1e-5, "off")
     path = findings.keep(SCENE, verdict, "my engine", tmp_path / "new")
     lines = path.read_text().splitlines()
@@ -125,17 +131,20 @@ def needs_b_and_gravity(smaller: Scene) -> bool:
 
 
 def test_violation_is_reduced_to_the_parts_that_it_needs():
-    """The check fails as long as body b is there and gravity is not zero; the rest can go."""
+    """The check fails as long as body b is there and gravity is not zero; the hinge, the moment, body a, the
+    spin and nine tenths of the duration of 1 s can go."""
     small = findings.shrunk(HINGED, needs_b_and_gravity, 40)
     assert [body.name for body in small.body] == ["b"] and not small.joint and not small.load
     assert small.gravity == HINGED.gravity and small.body[0].angular_velocity is None and small.duration < 0.1
 
 
-def test_violation_that_no_part_can_leave_stays_whole():
+def test_violation_that_needs_all_parts_is_not_reduced():
+    """The check fails for the whole scene only."""
     assert findings.shrunk(HINGED, lambda smaller: False) is HINGED
 
 
 def test_reduction_of_a_violation_ends_after_the_trials_allowed():
+    """At most 3 smaller scenes are tried, of more that would fail."""
     tried: list[Scene] = []
     findings.shrunk(HINGED, lambda smaller: not tried.append(smaller) and needs_b_and_gravity(smaller), 3)
     assert len(tried) == 3

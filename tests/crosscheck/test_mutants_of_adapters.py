@@ -161,8 +161,8 @@ def planted(name: str, defect: dict[str, str], folder: Path) -> Engine:
 
 @pytest.mark.parametrize(("way", "defect"), CASES)
 def test_planted_defect_moves_an_adapter_off_the_reference(way, defect, monkeypatch, tmp_path):
-    """One replaced text makes the motion, velocities or reactions wrong, or the run fail. Limits in WAYS are
-    far above the errors without the defect."""
+    """One replaced text of the adapter makes poses, velocities or reactions wrong, by the reference and
+    beyond the limits in WAYS, or the run fail. Without the defect they are within (test above)."""
     if not is_installed(way):
         pytest.skip(f"{WAYS[way][0]} is not installed")
     monkeypatch.syspath_prepend(str(tmp_path))

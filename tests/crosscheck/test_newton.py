@@ -1,4 +1,4 @@
-"""Newton and truth; its adapter and Newton's own kinematics and steps. Kernels compile for minutes."""
+"""The engine Newton / truths, the judge's start and accelerations. Its kernels compile for minutes."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ ERRORS = {
     "xpbd": 8.4e-3,
     "semi-implicit": 7.8e-3,
 }
-MARGIN = 1.5
+MARGIN = 1.5  # on the measured errors, which are errors of the method and not of rounding
+SINGLE = 1e-6  # some roundings of Newton's single precision, 6e-8
 
 
 def setting(family: str, step: float = STEP) -> Setting:
@@ -50,7 +51,8 @@ def four_bar() -> Scene:
     return Scene.from_file(FOLDER / "four_bar_free.toml").with_(duration=0.2)
 
 
-def off(family: str, step: float = STEP) -> float:
+def error_of_four_bar(family: str, step: float = STEP) -> float:
+    """Return the largest error of a solver on the four-bar over 0.2 s, by the truth, over the length."""
     scene, times = four_bar(), np.array([0.0, 0.1, 0.2])
     run = engine("newton").run(scene, times, setting(family, step))
     assert run.outcome is Outcome.COMPLETED, run.message
@@ -68,6 +70,7 @@ def test_newton_refuses_drivers_and_the_adapter_refuses_torsion_springs():
 
 
 def test_solvers_that_need_a_constraint_do_not_serve_a_free_body():
+    """Newton's default solver fails without joints; it serves a chain of bodies on joints."""
     served = {family for family in FAMILIES if engine("newton").serves(pushed(), family)}
     assert "defaults" not in served and {"lox", "xpbd"} <= served, served
     assert engine("newton").serves(chain(), "defaults")
@@ -78,16 +81,17 @@ def test_solvers_that_need_a_constraint_do_not_serve_a_free_body():
 @pytest.mark.parametrize("family", ERRORS)
 def test_newton_s_solver_moves_a_four_bar_within_its_measured_error(family):
     """Over 0.2 s at steps of 1 ms; ERRORS has the measured errors (of the length)."""
-    assert 0 < off(family) < MARGIN * ERRORS[family]
+    assert 0 < error_of_four_bar(family) < MARGIN * ERRORS[family]
 
 
 @INSTALLED
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ORDERS)
 def test_kamino_s_integrators_converge_with_their_order(family):
-    """Moreau's is of second order, Euler's of first; over 0.2 s of a four-bar at steps of 4, 2 and 1 ms."""
+    """Moreau's is of second order, Euler's of first; measured are 1.9 and 1.2 over 0.2 s of a four-bar at
+    steps of 4, 2 and 1 ms."""
     lengths = np.array([4e-3, 2e-3, 1e-3])
-    order, _ = np.polyfit(np.log(lengths), np.log([off(family, h) for h in lengths]), 1)
+    order, _ = np.polyfit(np.log(lengths), np.log([error_of_four_bar(family, h) for h in lengths]), 1)
     assert order == pytest.approx(ORDERS[family], abs=0.3)
 
 
@@ -95,31 +99,29 @@ def test_kamino_s_integrators_converge_with_their_order(family):
 @pytest.mark.slow
 def test_featherstone_does_not_close_the_loop():
     """The solver works on trees: without the closing joint the four-bar is off by over 0.1 of its length."""
-    assert off("featherstone") > 0.1
+    assert error_of_four_bar("featherstone") > 0.1
 
 
 @INSTALLED
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["spatial_slider_crank_gravity", "bennett", "flyball_governor"])
 def test_newton_s_kinematics_give_the_poses_and_velocities_at_the_start(name):
-    """Forward kinematics gives the poses of Newton's model and the velocities that the judge has.
-
-    Newton computes in single precision; a position is compared in m, a velocity relative to the largest.
-    """
+    """Newton's forward kinematics of the adapter's joint coordinates gives the poses of the adapter's bodies,
+    and its joint rates the judge's initial velocities; positions in m, velocities relative to the largest."""
     scene = SCENES[name]()
     mechanism = Mechanism(scene, spanning_tree(scene, JOINTS))
     state = mechanism.model.state()
     state.joint_qd.assign(mechanism.state.joint_qd)
     mechanism.newton.eval_fk(mechanism.model, mechanism.model.joint_q, state.joint_qd, state)
     given, found = mechanism.state.body_qd.numpy(), state.body_qd.numpy()
-    assert np.abs(found - given).max() < 1e-5 * (1 + np.abs(given).max())
+    assert np.abs(found - given).max() < 10 * SINGLE * (1 + np.abs(given).max())
     model, computed = mechanism.model.body_q.numpy(), state.body_q.numpy()
-    assert np.abs(model[:, :3] - computed[:, :3]).max() < 1e-6
-    assert np.abs(np.abs((model[:, 3:] * computed[:, 3:]).sum(axis=1)) - 1).max() < 1e-6  # quaternions
+    assert np.abs(model[:, :3] - computed[:, :3]).max() < SINGLE
+    assert np.abs(np.abs((model[:, 3:] * computed[:, 3:]).sum(axis=1)) - 1).max() < SINGLE  # quaternions
     linear, angular = initial_twists(scene)
     own = list(mechanism.tree.own)
-    assert np.abs(mechanism.motion().velocity[own] - linear).max() < 1e-5 * (1 + np.abs(linear).max())
-    assert np.abs(given[own, 3:] - angular).max() < 1e-5 * (1 + np.abs(angular).max())
+    assert np.abs(mechanism.motion().velocity[own] - linear).max() < 10 * SINGLE * (1 + np.abs(linear).max())
+    assert np.abs(given[own, 3:] - angular).max() < 10 * SINGLE * (1 + np.abs(angular).max())
 
 
 def pushed() -> Scene:
@@ -166,8 +168,9 @@ def chain() -> Scene:
     [("lox", pushed), ("semi-implicit", pushed), ("padmm, moreau", chain), ("mujoco", chain)],
 )
 def test_first_step_of_newton_has_the_reference_s_accelerations(family, make):
-    """The change of velocities over 1 ms / 1 ms, within 2 % of the largest acceleration; a load of opposite
-    sign, or in another frame or unit, changes them by more."""
+    """The change of velocities over 1 ms / 1 ms, within 2 % of the reference's largest acceleration, by the
+    step's error of first order; a load of opposite sign, or in another frame or unit, changes them by
+    more."""
     scene, h = make(), 1e-3
     run = engine("newton").run(scene, np.array([0.0, h]), setting(family, h))
     exact = natural_motion(scene, [0.0], EXTENDED)

@@ -64,7 +64,8 @@ FOUND = {
 @pytest.mark.slow
 @pytest.mark.parametrize(("make", "found"), FOUND.items())
 def test_compare_blames_no_engine_for_rounding(make, found, tmp_path, capsys):
-    """Exudyn reaches the truth only with larger errors on the turntable, which is said of its accuracy."""
+    """No verdict on three engines says that one moves another mechanism, has a wrong adapter or completes no
+    run. Exudyn reaches the truth only with larger errors on the turntable, which is said of its accuracy."""
     make().save(tmp_path / "scene.toml")
     words = [word for name in ENGINES for word in ("--engine", name)]
     assert main(["compare", str(tmp_path / "scene.toml"), *words]) == 0
