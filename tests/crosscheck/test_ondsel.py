@@ -66,8 +66,8 @@ def test_ondsel_stays_within_its_measured_error_of_the_truth(name: str) -> None:
         ("angular_acceleration", centripetal),
     ):
         exact = getattr(truth, field)
-        gap = abs(getattr(run, field) - exact).max() / max(size, abs(exact).max())
-        assert gap < MARGIN * measured_rates, f"{name}: {field} is {gap:.1e} of the largest from the truth"
+        off = abs(getattr(run, field) - exact).max() / max(size, abs(exact).max())
+        assert off < MARGIN * measured_rates, f"{name}: {field} is {off:.1e} of the largest from the truth"
 
 
 def test_uneven_sample_times_leave_the_error_at_rounding() -> None:
@@ -137,7 +137,8 @@ def clockwork(swapped: bool) -> Scene:
 
 @pytest.mark.parametrize("swapped", [False, True])
 def test_ondsel_moves_every_joint_type_as_pinocchio(swapped: bool) -> None:
-    """Kinematics and inverse dynamics of full inertia matrices; either order of the joints' bodies."""
+    """Poses, rates, accelerations and reactions of a driven mechanism with full inertia matrices, in either
+    order of the joints' bodies; Pinocchio computes them by another method, at a tolerance of 1e-11."""
     pytest.importorskip("pinocchio")
     scene = clockwork(swapped)
     times = np.linspace(0, scene.duration, 6)
@@ -148,11 +149,11 @@ def test_ondsel_moves_every_joint_type_as_pinocchio(swapped: bool) -> None:
     assert turned < MARGIN * TURNED, f"orientations differ by {turned:.1e} rad"
     for field in ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration"):
         ours, theirs = getattr(run, field), getattr(other, field)
-        gap = abs(ours - theirs).max() / abs(theirs).max()
-        assert gap < MARGIN * ALIKE, f"{field}: relative difference {gap:.1e}"
+        apart = abs(ours - theirs).max() / abs(theirs).max()
+        assert apart < MARGIN * ALIKE, f"{field}: relative difference {apart:.1e}"
     for joint, wrench in other.reactions.items():
-        gap = abs(run.reactions[joint] - wrench).max() / abs(wrench).max()
-        assert gap < MARGIN * REACTION, f"reaction in {joint}: relative difference {gap:.1e}"
+        apart = abs(run.reactions[joint] - wrench).max() / abs(wrench).max()
+        assert apart < MARGIN * REACTION, f"reaction in {joint}: relative difference {apart:.1e}"
 
 
 @pytest.mark.parametrize("swapped", [False, True])
@@ -167,28 +168,33 @@ def test_driver_with_a_phase_turns_the_joint_as_prescribed(swapped: bool) -> Non
     assert run.outcome is Outcome.COMPLETED, run.message
     found = joint_coordinates(scene, run.times, run.position, run.orientation, run.angular_velocity)["cyl"]
     prescribed = start - run.times + sine.amplitude * np.sin(5.0 * run.times + 0.4)
-    gap = abs(found[:, 0] - prescribed).max()
-    assert gap < MARGIN * ROUNDING, f"{gap:.1e} rad from the driver's angle"
+    off = abs(found[:, 0] - prescribed).max()
+    assert off < MARGIN * ROUNDING, f"{off:.1e} rad from the driver's angle"
 
 
-def test_wrong_accelerations_of_a_cylinder_between_moving_bodies_are_left_out() -> None:
-    """OndselSolver's accelerations are wrong there; reactions follow from them."""
+def test_accelerations_of_a_cylinder_on_a_moving_arm_are_left_out_and_its_poses_are_right() -> None:
+    """OndselSolver's accelerations are wrong between moving bodies, and reactions follow from them. Poses
+    have a measured error of 2.1e-9 m or rad by the reference. With the cylinder on the ground nothing is left
+    out."""
     base = clockwork(False)
     arm = body("arm", (-0.4, 0.2, 0.1), (0.1, 0.2, 0.3))
     joints = {joint.name: joint for joint in base.joint}
     carried = joints["cyl"].model_copy(update={"bodies": ("arm", "piston")})
     pivot = Revolute(name="pivot", bodies=("ground", "arm"), anchor=(-0.2, 0.1, 0.1), axis=(0.0, 0.2, 1.0))
+    moving, fixed = ((pivot, joint, joints["pin"], joints["end"]) for joint in (carried, joints["cyl"]))
     scene = base.with_(
         body=(arm, *(b for b in base.body if b.name in ("piston", "link"))),
-        joint=(pivot, carried, joints["pin"], joints["end"]),
+        joint=moving,
         driver=(Driver(joint="pivot", polynomial=(0.0, 0.5)), base.driver[1]),
     )
-    run = simulate(scene, np.linspace(0, 0.04, 3), 5e-3)
-    assert run.outcome is Outcome.COMPLETED, run.message
+    run, other = (simulate(s, np.linspace(0, 0.04, 3), 5e-3) for s in (scene, scene.with_(joint=fixed)))
+    assert completed_error(run, scene) < MARGIN * 2.1e-9
     assert run.acceleration is None and run.angular_acceleration is None and run.reactions is None
+    assert other.acceleration is not None and other.reactions is not None
 
 
 def test_ondsel_refuses_a_distance_joint() -> None:
+    """The refusal has the joint's type and the owner of the limit: the engine, not the adapter."""
     scene = clockwork(False)
     cord = Distance(name="cord", bodies=("crank", "sled"), anchors=((0.3, 0.0, 0.0), (1.0, 0.1, 0.2)))
     refusal = engine("ondsel").cannot(scene.with_(joint=(*scene.joint, cord)))
@@ -203,22 +209,23 @@ def test_ondsel_refuses_motions_that_drivers_do_not_determine(name: str) -> None
 
 
 def test_ondsel_gives_reactions_only_with_masses_and_without_loads() -> None:
-    """The motion of a driven mechanism is the same in all three cases."""
+    """Reactions of a driven mechanism without masses are undetermined, and OndselSolver receives no loads.
+    The drivers determine its motion, which is the same in all three cases."""
     base = SCENES["spatial_slider_crank_driven"]()
     bare = base.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in base.body))
     loaded = base.with_(load=(Moment(body="crank", moment=(0.0, 1.0, 0.0)),))
     runs = {scene: simulate(scene, np.array([0.01]), 1e-3) for scene in (base, bare, loaded)}
     assert runs[base].reactions is not None, "no reactions of a scene without loads"
     assert runs[bare].reactions is None and runs[loaded].reactions is None, "reactions of unknown forces"
-    gap = max(abs(run.position - runs[base].position).max() for run in runs.values())
-    assert gap < MARGIN * ROUNDING, f"masses and loads move a driven mechanism by {gap:.1e} m"
+    apart = max(abs(run.position - runs[base].position).max() for run in runs.values())
+    assert apart < MARGIN * ROUNDING, f"masses and loads move a driven mechanism by {apart:.1e} m"
 
 
 def test_driver_beyond_the_reach_ends_the_run_with_the_samples_before_the_failure() -> None:
-    """The slider starts at the end of its reach. OndselSolver first gives a pose 5 mm beyond it, which the
-    judge measures as a violation of 0.05 of the length, and then fails."""
+    """The slider starts at the end of its reach. OndselSolver gives a pose at 0.01 s, 5 mm beyond it, which
+    the judge measures as a violation of 0.05 of the length, and then fails."""
     base = SCENES["spatial_slider_crank"]()
     scene = base.with_(driver=(Driver(joint="D", polynomial=(0.0, 0.0, 50.0)),), load=())
     run = simulate(scene, np.linspace(0, 0.2, 21), 2e-3)
     assert run.outcome is Outcome.NOT_CONVERGED and "OndselSolver failed" in run.message, run.message
-    assert 0 < len(run.times) < 21 and violation_series(scene, run)[1:].min(initial=1.0) > 0.01
+    assert len(run.times) == 2 and violation_series(scene, run)[1] == pytest.approx(0.05, rel=0.01)

@@ -26,6 +26,7 @@ def nothing_more(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_optional_engines_without_their_packages_are_not_run_by_default(nothing_more: None) -> None:
+    """They stay known by name; a command that names no engine runs the built-in ones without a notice."""
     assert set(OPTIONAL) <= set(engine_names()), f"known: {engine_names()}"
     assert not any(map(installed, OPTIONAL)), f"installed: {[n for n in OPTIONAL if installed(n)]}"
     assert default_engines()[: len(BUILT_IN)] == BUILT_IN and not set(OPTIONAL) & set(default_engines())
@@ -36,20 +37,22 @@ def test_optional_engines_without_their_packages_are_not_run_by_default(nothing_
 
 @pytest.mark.parametrize("name", OPTIONAL + ON_REQUEST)
 def test_request_for_a_missing_engine_names_the_package_to_install(nothing_more: None, name: str) -> None:
+    """The reason, and the error of a command that names the engine, have the command of pip."""
     reason = missing_package(name)
     assert reason and f"pip install {engine(name).package}" in reason, reason
-    with pytest.raises(RequestError, match="pip install"):
+    with pytest.raises(RequestError, match=f"pip install {engine(name).package}"):
         find_engines([name], print)
 
 
 @pytest.mark.parametrize("name", OPTIONAL)
 def test_installed_engines_run_by_default(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every package has a version, so that it counts as installed."""
     monkeypatch.setattr(metadata, "version", lambda package: "1.0")
     assert installed(name) and name in default_engines(), f"default: {default_engines()}"
 
 
 def test_engine_all_means_every_installed_engine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Named engines come first, each once."""
+    """Installed are MuJoCo, Drake and CasADi. Engines named beside "all" come first, each once."""
     known = {"mujoco", "drake", "casadi"}
     monkeypatch.setattr(engine_module, "installed", lambda name: name in known)
     monkeypatch.setattr(request, "missing_package", lambda name: "")

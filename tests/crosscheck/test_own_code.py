@@ -1,4 +1,4 @@
-"""Lines of an engine's own code or XML / the settings that its adapter makes, field by field."""
+"""Code or XML that crosscheck shows for a run with an engine / the settings that its adapter makes."""
 
 from __future__ import annotations
 
@@ -52,6 +52,7 @@ def test_shown_mjcf_and_python_set_the_options_of_a_mujoco_run(family, options):
 
 
 def test_family_defaults_of_mujoco_leaves_every_option_as_the_library_has_it():
+    """Options, softness and impedance of MuJoCo's own model with a step of 0.5 ms and the scene's gravity."""
     mujoco = pytest.importorskip("mujoco")
     from crosscheck.engines.mujoco.simulation import Simulation
 
@@ -113,6 +114,7 @@ def test_shown_python_sets_the_solver_of_a_pinocchio_run():
 
 
 def test_shown_python_of_simbody_names_an_integrator_of_opensim():
+    """``IntegratorMethod_…`` is an attribute of OpenSim's Manager; the accuracy is the setting's."""
     opensim = pytest.importorskip("opensim")
     line = engine("simbody").own_code(SCENE, Setting("merson", {"accuracy": 1e-6}))
     assert hasattr(opensim.Manager, re.search(r"IntegratorMethod_\w+", line)[0])
@@ -120,6 +122,7 @@ def test_shown_python_of_simbody_names_an_integrator_of_opensim():
 
 
 def test_shown_python_of_mbref_runs_with_its_tolerance():
+    """The line, evaluated, gives a completed motion with the setting's rtol."""
     line = engine("mbref").own_code(SCENE, Setting("taylor", {"rtol": 1e-6}))
     motion = eval(line, {"mbref": mbref, "scene": SCENE.with_(duration=0.001)})
     assert motion.settings["rtol"] == 1e-6 and motion.outcome.name == "COMPLETED"
@@ -127,7 +130,7 @@ def test_shown_python_of_mbref_runs_with_its_tolerance():
 
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
 def test_no_code_is_shown_for_families_that_crosscheck_integrates(name):
-    """Pinocchio has no integrator: there the code of three families sets its solver."""
+    """The text is empty. Pinocchio has no integrator: the code of three families sets its solver instead."""
     pytest.importorskip(name)
     found, solved = engine(name), {"pinocchio": {"defaults", "proximal", "baumgarte"}}.get(name, set())
     integrated = set(found.integrated_here) - solved
@@ -136,6 +139,7 @@ def test_no_code_is_shown_for_families_that_crosscheck_integrates(name):
 
 
 def test_assignments_are_recorded_as_lines_of_code():
+    """``Written`` stands for an object of Exudyn: an assignment to its attribute becomes a line of Python."""
     statements: list[str] = []
     settings = Written("settings", statements)
     settings.newton.relativeTolerance = 1e-6
@@ -144,8 +148,8 @@ def test_assignments_are_recorded_as_lines_of_code():
 
 
 def test_fastest_run_within_the_level_is_chosen_otherwise_the_most_accurate():
-    """Within 1e-6, engine a's family "own" has runs of 1, 2 and 3 s: the one of 1 s. Engine b has none: the
-    one of least error."""
+    """Engine a has three runs of family "own" within the error 1e-6: the one of 1 s, error 5e-7, is chosen,
+    and family "ours" is excluded. Engine b has none within it: the one of least error is chosen."""
 
     def record(engine: str, error: float, seconds: float, family: str = "own") -> dict[str, Any]:
         return {

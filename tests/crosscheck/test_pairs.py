@@ -101,13 +101,14 @@ def error(name: str, mechanism: Scene) -> float:
 @pytest.mark.parametrize("name", ENGINES)
 @pytest.mark.parametrize("pair", PAIRS)
 def test_both_loads_of_a_pair_act(name, pair):
-    """The truth is the motion by Gauss's principle with both loads; engines that refuse it are skipped."""
+    """The truth is the motion by Gauss's principle with both loads, and each load alone moves otherwise (test
+    below); engines that refuse the pair are skipped."""
     assert error(name, scene(load=PAIRS[pair])) < LIKE_TRUTH
 
 
 @pytest.mark.parametrize("pair", PAIRS)
 def test_each_load_of_a_pair_changes_the_motion(pair):
-    """The motion with one load is off by over 100 times what an engine may be off."""
+    """By Gauss's principle, the motion with one load is off by over 100 times an engine's allowed error."""
     both = gauss_motion(scene(load=PAIRS[pair]), TIMES)
     for lost in range(2):
         alone = gauss_motion(scene(load=PAIRS[pair][lost : lost + 1]), TIMES)
@@ -129,13 +130,13 @@ SECOND_JOINTS = {
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_driver_and_torsion_spring_act_in_one_joint(name):
-    """The truth is the motion by Gauss's principle."""
+    """The truth is the motion by Gauss's principle; engines that refuse the scene are skipped."""
     assert error(name, scene(**DRIVEN_SPRUNG)) < LIKE_TRUTH
 
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_two_drivers_move_joints_of_one_body(name):
-    """The truth is the motion by Gauss's principle."""
+    """The truth is the motion by Gauss's principle; engines that refuse the scene are skipped."""
     assert error(name, scene(driver=TWO_DRIVERS)) < LIKE_TRUTH
 
 

@@ -1,4 +1,4 @@
-"""The paper's cells / the paper; a few cells / real runs; singular positions / the fold's closed form."""
+"""Runs / the cells of the paper's tables; singular positions / ranks and residuals known by hand."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_every_cell_of_the_paper_has_a_run_of_its_method():
     assert len(used) == 1, f"{len(used)} sets of settings, not one for all cells"
 
 
-def test_every_variant_changes_one_setting():
+def test_every_variant_of_the_settings_changes_one_of_them():
     """One option of the run, of ALF, or the size, seed or integrator differs from the base's."""
     default = {f.name for f in dataclasses.fields(Limits)}
     for variant in settings.SWEEP:
@@ -80,9 +80,9 @@ def test_every_variant_changes_one_setting():
 
 
 def test_errors_near_a_singular_position_raise_the_iterations_of_alf():
-    """Iterations 1 to 0.001 rad from θ₂ = 0, without errors and with errors of 1e-8. One iteration divides
-    the errors in the vanishing direction by 1 + α σ²; at 0.03 rad the paper's limit of iterations is
-    exceeded."""
+    """Near θ₂ = 0, with exact right-hand sides γ and with errors of 1e-8. One iteration divides errors in the
+    vanishing direction by 1 + α σ², where σ falls with the distance: 6 iterations suffice 1 rad away, errors
+    raise them at each nearer distance, and 0.03 rad away they exceed the paper's limit."""
     exact = [singular.alf_iterations(distance, 0.0) for distance in (1.0, 0.001)]
     wrong = [singular.alf_iterations(distance, 1e-8) for distance in (1.0, 0.1, 0.03, 0.01)]
     assert max(exact) <= 6, f"iterations with γ exact, 1 and 0.001 rad from θ₂ = 0: {exact}"
@@ -124,7 +124,8 @@ def test_run_ends_as_its_cell_of_the_paper(table, row, column):
 
 
 def test_forced_step_carries_a_run_on_to_its_violation():
-    """Without the forced step the run ends by its step size (STEP_FAILED)."""
+    """The paper's rhombus from θ₂ = π/4 ends by a violation of its constraints if steps below a least length
+    are accepted; without this forced step the same run ends by its step size (STEP_FAILED)."""
     case = runs.linkage("MPI (SVD)", "θ₂ = π/4", np.array([0.1]))
     options = dict(case.setting.options)
     forced = simulate(case.scene, case.setting.family, case.times, Limits(**options))
@@ -141,17 +142,19 @@ def test_forced_step_below_all_steps_changes_no_bit():
 
 
 def test_rank_of_the_rhombus_drops_from_18_to_17_where_it_is_flat():
-    """At the crossings, and 5 ms behind each; scaled singular values of the 20 rows."""
+    """Rank by the scaled singular values of its 20 rows: 17 at each crossing, 18 at 5 ms behind each. Flat at
+    θ = kπ, where all bars lie on one line."""
     for theta0 in (math.pi / 4, math.pi / 2):
         times = [t for t, _ in singular.crossings(theta0, 0.06)]
         at = [singular.rank(v) for v in singular.scaled_singular_values(four_bar(theta0), np.array(times))]
-        between = singular.scaled_singular_values(four_bar(theta0), np.array(times) + 0.005)
-        beside = [singular.rank(v) for v in between]
-        assert set(at) == {17} and set(beside) == {18}, f"ranks at kπ {at}, beside {beside}"
+        behind = singular.scaled_singular_values(four_bar(theta0), np.array(times) + 0.005)
+        regular = [singular.rank(v) for v in behind]
+        assert set(at) == {17} and set(regular) == {18}, f"ranks at kπ {at}, behind {regular}"
 
 
 def test_fold_satisfies_the_driver_from_pi_and_not_from_zero():
-    """Driver at -0.1 rad: the fold from θ = π obeys joints and driver, the fold from 0 misses it by 0.1."""
+    """The driver turns by -0.1 rad. On the fold from θ = π the coupler turns with the crank, and all
+    residuals are rounding; on the fold from 0 the crank would rest and miss the driver's angle by 0.1 rad."""
     open_fold, closed = (singular.fold_residual(theta, -0.1) for theta in (math.pi, 0.0))
     assert open_fold < 1e-14, f"on the fold from π the joints and the driver are off by {open_fold}"
     assert math.isclose(closed, 0.1, rel_tol=1e-9)
