@@ -1,4 +1,4 @@
-"""The solver of the truths against solutions known in closed form."""
+"""Picard's iteration, by which the judge integrates its truths / solutions in closed form."""
 
 from concurrent.futures import ThreadPoolExecutor
 from time import sleep
@@ -6,12 +6,11 @@ from time import sleep
 import numpy as np
 import pytest
 
-from crosscheck.judge.truth import picard
 from crosscheck.judge.truth.picard import NoSolution, Solution
 
 
 def test_solution_with_a_pole_ends_at_the_pole():
-    """y' = y², y(0) = 1: y = 1 / (1 - t)."""
+    """y' = y², y(0) = 1: y = 1 / (1 - t) is 10 at 0.9 and has no value at 1.1; the solution ends at t = 1."""
     solution = Solution(lambda y: y**2, np.array([1.0]), 0.1)
     assert abs(solution(np.array([0.9]))[0, 0] - 10) < 1e-12
     with pytest.raises(NoSolution) as ended:
@@ -20,7 +19,7 @@ def test_solution_with_a_pole_ends_at_the_pole():
 
 
 def test_panels_reach_rounding_error_over_many_periods():
-    """The sine over 48 periods, by y'' = -y."""
+    """The sine over 48 periods, by y'' = -y, to 1e-14; the solver computes in extended precision."""
     t = np.linspace(0, 300.0, 50)
     got = Solution(lambda y: np.stack([y[:, 1], -y[:, 0]], axis=1), np.array([0.0, 1.0]), 0.1)(t)
     off = np.abs(got[:, 0].astype(float) - np.sin(t)).max()
@@ -28,7 +27,8 @@ def test_panels_reach_rounding_error_over_many_periods():
 
 
 def test_threads_that_share_a_solution_get_the_states_of_one_thread():
-    """Runs of a study share the truth of a scene. The derivative yields to another thread at every call."""
+    """Eight threads evaluate one solution, as runs of a study do, and the derivative yields to another thread
+    at every call; the states are those of a solution of one thread, to the last bit."""
 
     def derivative(y):
         sleep(0)
@@ -42,12 +42,18 @@ def test_threads_that_share_a_solution_get_the_states_of_one_thread():
         np.testing.assert_array_equal(answer, alone(times))
 
 
-def test_solution_finds_the_times_at_which_a_component_has_given_values():
-    """y' = (1, 2 y₀): the first grows as t, the second as t²."""
-    made = picard.Solution(lambda y: np.stack([np.ones_like(y[:, 0]), 2 * y[:, 0]], axis=1), np.zeros(2), 0.5)
-    assert made.where(1, np.array([0.25, 4.0])).astype(float) == pytest.approx(
-        np.array([[0.5, 0.25], [2.0, 4.0]])
-    )
-    end = made.reach(lambda y: y[0] >= 3.0)
+def parabola() -> Solution:
+    """The solution of y' = (1, 2 y₀) from zero: y = (t, t²)."""
+    return Solution(lambda y: np.stack([np.ones_like(y[:, 0]), 2 * y[:, 0]], axis=1), np.zeros(2), 0.5)
+
+
+def test_solution_finds_the_states_at_which_a_component_has_given_values():
+    """y₁ = t² is 0.25 at t = y₀ = 0.5, and 4 at 2."""
+    found = parabola().where(1, np.array([0.25, 4.0])).astype(float)
+    assert found == pytest.approx(np.array([[0.5, 0.25], [2.0, 4.0]]))
+
+
+def test_solution_is_continued_until_its_state_meets_a_condition():
+    """The returned state (t, t²) has y₀ ≥ 3."""
+    end = parabola().reach(lambda y: y[0] >= 3.0)
     assert end[0] >= 3.0 and float(end[1]) == pytest.approx(float(end[0]) ** 2)
-    assert made(np.array([0.0, 1.5])).astype(float) == pytest.approx(np.array([[0, 0], [1.5, 2.25]]))

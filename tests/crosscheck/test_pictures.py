@@ -1,4 +1,4 @@
-"""Motions to be shown: the runs they repeat / their poses, to the digits kept; branches / closed forms."""
+"""Motions for pictures: runs that are repeated, their poses and digits; branches / closed forms."""
 
 import math
 
@@ -24,26 +24,32 @@ def run():
 
 def test_runs_along_both_branches_part_at_the_crossing(run, tmp_path):
     """The rhombus is flat at θ = -π, t = 1.5 π / 124.8 s: then the coupler either goes on parallel to the
-    ground (centre at twice the crank's centre + 0.25 m) or folds onto the crank."""
-    first = branches([run], tmp_path / "branches.jsonl")
-    asked = [record["asked"]["options"] for record in first]
+    ground (centre at twice the crank's centre + 0.25 m) or folds onto the crank. Poses are stored with six
+    digits of 0.75 m."""
+    found = branches([run], tmp_path / "branches.jsonl")
+    asked = [record["asked"]["options"] for record in found]
     assert asked == [{"rtol": 1e-9, BRANCHES: [[2, branch]]} for branch in (1, 2)]
-    smooth, fold = (np.array(record["bodies"]["coupler"]["position"]) for record in first)
-    times = np.array(first[0]["times"])
+    smooth, fold = (np.array(record["bodies"]["coupler"]["position"]) for record in found)
+    times = np.array(found[0]["times"])
     crossing = 1.5 * math.pi / RATE
     assert len(times) == FRAMES and times[0] == pytest.approx(math.pi / RATE) and times[-1] == 0.05
     crank = 0.25 * np.exp(1j * (math.pi / 2 - RATE * times))
     along_crank = np.column_stack([crank.real, crank.imag, 0 * times])
-    lifted = np.array([0.25, 0.0, 0.0])
-    assert np.abs(smooth - (2 * along_crank + lifted)).max() < 1e-6
+    assert np.abs(smooth - (2 * along_crank + [0.25, 0.0, 0.0])).max() < 1e-6
     assert np.abs(fold - np.where((times > crossing)[:, None], along_crank, smooth)).max() < 1e-6
-    size = (tmp_path / "branches.jsonl").stat().st_size
-    assert branches([run], tmp_path / "branches.jsonl") == first
-    assert (tmp_path / "branches.jsonl").stat().st_size == size, "stored runs were made again"
+
+
+def test_stored_runs_along_branches_are_not_made_again(run, tmp_path):
+    """The second call returns the stored records, and adds none to their file."""
+    found = branches([run], tmp_path / "branches.jsonl")
+    stored = (tmp_path / "branches.jsonl").read_text()
+    assert branches([run], tmp_path / "branches.jsonl") == found
+    assert (tmp_path / "branches.jsonl").read_text() == stored
 
 
 def test_worst_run_is_shown_by_its_poses_alone(run):
-    """The run of largest error, at the times of the truth's motion; a crashed run has no poses to show."""
+    """The run of largest error, at the times of the truth's motion, without rates and reactions; a crashed
+    run has no poses to show."""
     case, record = run
     worse = {**record, "metrics": {**record["metrics"], "error": 1.0}}
     coarse = case._replace(setting=Setting("taylor", {"rtol": 1e-3}))
@@ -55,6 +61,7 @@ def test_worst_run_is_shown_by_its_poses_alone(run):
 
 
 def test_shown_numbers_have_six_digits_of_the_largest():
+    """123.456789012 m and 1e-9 m in one array are 123.457 m and 0; an empty array stays empty."""
     exact = {"a": {"position": [[123.456789012, 1e-9, 0.0]], "orientation": [[1.0, 0.0, 0.0, 0.0]]}}
     assert shortened(exact)["a"]["position"] == [[123.457, 0.0, 0.0]] and DIGITS == 6
     empty = {"a": {"position": np.zeros((0, 3)), "orientation": np.zeros((0, 4))}}
@@ -62,20 +69,24 @@ def test_shown_numbers_have_six_digits_of_the_largest():
 
 
 def test_crossings_with_several_branches_are_shown_before_others():
-    """Up to two crossings, by their number: those with several branches, otherwise the first."""
+    """Up to two crossings are shown, given by their numbers from 1: first those with several branches; if
+    there are none, the first crossing alone."""
     alone, several = {"velocity": [1]}, {"velocity": [1, 2]}
     assert shown([alone, several, several, several]) == [2, 3]
     assert shown([alone, alone]) == [1]
 
 
 def test_run_takes_an_option_that_its_sweep_does_not_vary(capsys):
-    """Option branches of taylor, by which the run takes branch 2 at the second crossing."""
+    """The record of the command has option branches of taylor, by which a run takes branch 2 at the second
+    crossing; ``crosscheck run`` accepts options that settings of a sweep lack."""
     asked = "run four_bar --engine mbref --setting taylor --option branches=[[2,2]] --times 0.05"
     assert main([*asked.split(), "--json"]) == 0
     assert '"branches": [[2, 2]]' in capsys.readouterr().out
 
 
 def test_unknown_option_of_a_family_is_refused_with_the_known_ones(capsys):
+    """Option "branch" of ``crosscheck run`` is misspelt: exit status 2, and the message lists rtol,
+    branches."""
     asked = "run four_bar --engine mbref --setting taylor --option branches=[[2,2]] --times 0.05"
     assert main([*asked.replace("branches", "branch").split()]) == 2
     assert "has no option 'branch'; it has: rtol, branches; did you mean" in capsys.readouterr().err

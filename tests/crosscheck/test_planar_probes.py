@@ -31,7 +31,8 @@ def loops(scene: Scene) -> int:
 
 
 def test_planar_engine_is_run_on_at_least_twenty_loops():
-    """Without planar probes an engine of hinges along z and slides would be run on few closed loops."""
+    """Specimens that an engine of hinges along z and slides can run, and that have more joints than bodies:
+    the planar probes, added for such an engine, are the most."""
     scenes = [specimen.scene for specimen in find_specimens(None, 0.0, ENGINE)]
     able = [s for s in scenes if PLANAR.cannot(s) is None and loops(s) > 0]
     assert len(able) >= 20 and len({s.name for s in scenes}) == len(scenes), [s.name for s in able]
@@ -39,6 +40,7 @@ def test_planar_engine_is_run_on_at_least_twenty_loops():
 
 @pytest.mark.parametrize("name", ["pinocchio", "mujoco"])
 def test_spatial_engine_gets_planar_probes_only_by_name(name):
+    """MuJoCo and Pinocchio are tried on spatial probes; a request by name gives a planar one too."""
     assert not is_planar(engine(name))
     assert not {s.scene.name for s in find_specimens(None, 0.0, name)} & set(planar_loops())
     assert find_specimens(["planar four-bar: spring"], 0.0, name)[0].scene.load
