@@ -46,6 +46,7 @@ SAYS = {  # what each function of DAMAGES changes in a good answer: the words of
 
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_error_of_a_malformed_answer_names_its_defect(damage: str):
+    """The engine MALFORMED changes one thing in a good answer; SAYS has the words of the error."""
     with pytest.raises(MalformedAnswer) as caught:
         well_formed(MALFORMED.run(SCENE, TIMES, Setting("a", {"damage": damage})), SCENE, TIMES)
     assert SAYS[damage] in str(caught.value)
@@ -57,7 +58,8 @@ def test_a_failed_run_may_answer_with_the_first_samples_alone():
     assert well_formed(good, SCENE, TIMES).times.tolist() == [0.0, 0.1]
 
 
-def test_a_completed_run_shorter_than_a_tick_of_the_clock_is_an_answer():
+def test_a_completed_run_of_zero_seconds_is_a_well_formed_answer():
+    """A run that is shorter than a tick of the clock has cost 0 s."""
     good = FAKE.run(SCENE, TIMES, Setting("a"))
     assert well_formed(replace(good, cost=Cost(seconds=0.0)), SCENE, TIMES).outcome is Outcome.COMPLETED
 

@@ -15,7 +15,6 @@ from crosscheck.engines.mujoco.original import FAMILIES, FINER, STIFFER, STIFFER
 from crosscheck.judge.constraints import initial_poses, scene_length
 from crosscheck.judge.free_fall import falls_freely
 from crosscheck.judge.gauss_motion import gauss_motion
-from crosscheck.judge.metrics import violation_series
 from crosscheck.setting import AS_IN_FILE
 from crosscheck.study.command import command
 from crosscheck.study.grades import Judged
@@ -49,9 +48,10 @@ DOG = """<mujoco><compiler angle="radian"/><worldbody><frame pos="0 0 0.1">
 <geom type="capsule" fromto="0 0 0 0.05 0 -.2" size=".02" mass="0.5"/></body></body></frame></worldbody>
 <keyframe><key name="high" qpos="1 0 2 1 0 0 0 0.3" qvel="0 0 0 0 0 0 2"/></keyframe></mujoco>"""
 TILTED = ImportOptions(keyframe="tilted", without=["limits"])
+ROUNDING = 1e-12  # m; of positions of 1 m over 100 steps, 2e-16 is measured
 
 
-def found(tmp_path, text: str, options: ImportOptions | None = None):
+def imported(tmp_path, text: str, options: ImportOptions | None = None):
     path = tmp_path / "robot.xml"
     path.write_text(text)
     return find_scenes([str(path)], options or ImportOptions())[0]
@@ -61,8 +61,9 @@ def setting_of(scene, family: str) -> Setting:
     return [s for s in of_file("mujoco", scene) if s.family == family][-1]
 
 
-def own_loop(model, start, times) -> np.ndarray:
-    """Return centres of mass (k, nb, 3) by mj_step, whose last step before a sample is shortened."""
+def stepped_by_mujoco(model, start, times) -> np.ndarray:
+    """Return centres of mass (k, nb, 3) by MuJoCo's mj_step, whose last step before a sample is
+    shortened."""
     for name in ("CONTACT", "LIMIT"):
         model.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
     data = mujoco.MjData(model)
@@ -82,26 +83,25 @@ def own_loop(model, start, times) -> np.ndarray:
     return np.array(reached)
 
 
-def test_family_as_in_file_takes_mujocos_steps_with_the_options_of_the_file(tmp_path):
-    """Positions equal a loop of mj_step on the file from the assembled pose; its soft closure opens."""
-    scene = found(tmp_path, FOUR_BAR, TILTED)
-    setting, times = setting_of(scene, AS_IN_FILE), np.array([0.0, 0.04, 0.25, 0.301, 0.4])
-    assert {k: setting.options[k] for k in ("step", "integrator", "solref")} == {
-        "step": 0.004,
-        "integrator": "implicitfast",
-        "solref": "0.03 1",
-    }
-    run = engine("mujoco").run(scene, times, setting)
-    model = mujoco.MjModel.from_xml_string(FOUR_BAR)
-    read = source(tmp_path / "robot.xml", TILTED)
-    assert np.abs(run.position - own_loop(model, read.qpos, times)).max() < 1e-12
-    assert np.abs(run.position[0] - [b.position for b in scene.body]).max() < 1e-12
-    assert violation_series(scene, run).max() * scene_length(scene) > 1e-5, "m; stiff closures keep 1e-9 m"
+def test_setting_as_in_file_has_the_step_integrator_and_solref_of_the_file(tmp_path):
+    """FOUR_BAR has timestep="0.004", integrator="implicitfast" and, at its closure, solref="0.03 1"."""
+    options = setting_of(imported(tmp_path, FOUR_BAR, TILTED), AS_IN_FILE).options
+    assert (options["step"], options["integrator"], options["solref"]) == (0.004, "implicitfast", "0.03 1")
+
+
+def test_run_as_in_file_equals_steps_of_mujoco_on_its_own_model_of_the_file(tmp_path):
+    """`stepped_by_mujoco` calls mj_step itself, from the pose at which the import has closed the loop."""
+    scene = imported(tmp_path, FOUR_BAR, TILTED)
+    times = np.array([0.0, 0.04, 0.25, 0.301, 0.4])  # s; 0.25 and 0.301 lie between steps of 0.004
+    run = engine("mujoco").run(scene, times, setting_of(scene, AS_IN_FILE))
+    start = source(tmp_path / "robot.xml", TILTED).qpos
+    stepped = stepped_by_mujoco(mujoco.MjModel.from_xml_string(FOUR_BAR), start, times)
+    assert np.abs(run.position - stepped).max() < ROUNDING
 
 
 def test_velocities_and_accelerations_of_the_files_model_are_differences_of_its_motion(tmp_path):
-    """Central differences over 2e-5 s; relative errors allowed: 1e-5 of velocities, 1e-3 of accelerations."""
-    scene, h = found(tmp_path, FOUR_BAR, TILTED), 1e-5
+    """Central differences over 2e-5 s; the limits are 1.5 to 5 times the measured relative differences."""
+    scene, h = imported(tmp_path, FOUR_BAR, TILTED), 1e-5
     setting = setting_of(scene, STIFFER_RK4)
     run = engine("mujoco").run(scene, np.array([0.1 - h, 0.1, 0.1 + h]), setting)
     slope = (run.position[2] - run.position[0]) / (2 * h)
@@ -111,8 +111,9 @@ def test_velocities_and_accelerations_of_the_files_model_are_differences_of_its_
 
 
 def test_stiff_closures_and_small_steps_together_reach_the_motion_of_exact_joints(tmp_path):
-    """Errors of positions (m) against Gauss's principle; smaller steps alone leave the closures soft."""
-    scene, times = found(tmp_path, FOUR_BAR, TILTED), np.array([0.0, 0.05])
+    """Errors of positions (m) after 0.05 s by Gauss's principle with exact joints: 8e-3 as in the file, 6e-4
+    with smaller steps, whose closures are soft, and 4e-10 with stiff closures and RK4 too (measured)."""
+    scene, times = imported(tmp_path, FOUR_BAR, TILTED), np.array([0.0, 0.05])
     true = gauss_motion(scene, tuple(times.tolist())).position
     off = {
         family: np.abs(engine("mujoco").run(scene, times, setting_of(scene, family)).position - true).max()
@@ -124,18 +125,18 @@ def test_stiff_closures_and_small_steps_together_reach_the_motion_of_exact_joint
 
 def test_families_of_the_files_model_are_offered_before_those_of_the_scene(tmp_path):
     """MuJoCo runs the file's own model, and the scene in families such as `tuned`."""
-    families = list(dict.fromkeys(s.family for s in offer("mujoco", found(tmp_path, FOUR_BAR, TILTED))))
+    families = list(dict.fromkeys(s.family for s in offer("mujoco", imported(tmp_path, FOUR_BAR, TILTED))))
     assert families[: len(FAMILIES)] == list(FAMILIES) and "tuned" in families[len(FAMILIES) :]
 
 
 def test_no_family_of_a_file_is_offered_for_other_engines_or_scenes(tmp_path):
-    scene = found(tmp_path, FOUR_BAR, TILTED)
+    scene = imported(tmp_path, FOUR_BAR, TILTED)
     assert not of_file("exudyn", scene) and not of_file("mujoco", SCENES["four_bar"]())
 
 
 def test_quick_depth_runs_the_files_own_settings_as_the_only_family_of_the_file(tmp_path):
     """Smaller steps and stiffer closures of the file's model are left to the whole depth."""
-    scene = found(tmp_path, FOUR_BAR, TILTED).with_(duration=0.3)
+    scene = imported(tmp_path, FOUR_BAR, TILTED).with_(duration=0.3)
     cases = [Case(scene, np.array([0.0, 0.3]), "mujoco", s) for s in offer("mujoco", scene)]
     few = {case.setting.family for case in of_few_families(cases)}
     assert few & set(FAMILIES) == {AS_IN_FILE} and "tuned" in few, few
@@ -143,7 +144,7 @@ def test_quick_depth_runs_the_files_own_settings_as_the_only_family_of_the_file(
 
 def test_printed_command_of_a_run_names_the_file_with_its_import_options(tmp_path):
     """The path is the command's argument, so it is no option ``file=`` of the setting."""
-    scene = found(tmp_path, FOUR_BAR, TILTED)
+    scene = imported(tmp_path, FOUR_BAR, TILTED)
     times = np.linspace(0, scene.duration, 3)
     record = run_here(Case(scene, times, "mujoco", setting_of(scene, AS_IN_FILE), 5.0, 0.0))
     said = command(record, "robot.xml --without limits --keyframe tilted")
@@ -179,7 +180,8 @@ def sentence(scene, **changes) -> str:
 
 
 def test_verdict_on_a_files_own_settings_states_errors_and_the_opening_of_closures(tmp_path):
-    assert sentence(found(tmp_path, FOUR_BAR, TILTED)) == (
+    """The run of `sentence` is off by 20 mm and 0.03 rad, and its closure is open by 1.2 mm."""
+    assert sentence(imported(tmp_path, FOUR_BAR, TILTED)) == (
         "robot at its own settings (time step 0.004 s, Euler, solref 0.03 1) is wrong: bodies are off by "
         "up to 20 mm and 0.03 rad, and its closures open by up to 1.2 mm. `crosscheck tune mujoco "
         "/robots/robot.xml --closure 0.1mm` finds a solref and a time step that are ten times better. "
@@ -197,36 +199,41 @@ def test_verdict_on_a_files_own_settings_states_errors_and_the_opening_of_closur
         ),
         ({"metrics": {"error": None}}, "has no known error: its closures open by up to 1.2 mm."),
     ],
+    ids=["right", "failed", "no truth"],
 )
 def test_verdict_on_right_failed_and_unjudged_runs_proposes_no_tuning(tmp_path, changes, says):
-    said = sentence(found(tmp_path, FOUR_BAR, TILTED), **changes)
+    said = sentence(imported(tmp_path, FOUR_BAR, TILTED), **changes)
     assert says in said and "tune" not in said, said
 
 
-def test_verdict_on_the_file_takes_no_run_of_another_family(tmp_path):
-    assert sentence(found(tmp_path, FOUR_BAR, TILTED), family="tuned") == ""
+def test_run_of_another_family_has_no_verdict_on_the_files_own_settings(tmp_path):
+    assert sentence(imported(tmp_path, FOUR_BAR, TILTED), family="tuned") == ""
 
 
 def test_a_free_base_is_reported_with_the_option_that_holds_it(tmp_path):
-    free = found(tmp_path, DOG)
+    free = imported(tmp_path, DOG)
     (said,) = free_falls([Judged(free, {}, [])])
     assert "verifies nothing but gravity: `--hold trunk`" in said
 
 
 def test_hold_fixes_the_base_at_the_pose_of_the_keyframe(tmp_path):
     """Trunk at (1, 0, 2) m, hip 0.2 m before it with 2 rad/s about y: only the leg is left."""
-    fixed = found(tmp_path, DOG, ImportOptions(hold=["trunk"], keyframe="high"))
+    fixed = imported(tmp_path, DOG, ImportOptions(hold=["trunk"], keyframe="high"))
     assert not falls_freely(fixed) and [body.name for body in fixed.body] == ["leg"]
     (joint,) = fixed.joint
     assert joint.anchor == pytest.approx((1.2, 0.0, 2.0))
-    run = engine("mujoco").run(fixed, np.array([0.0, 0.2]), setting_of(fixed, STIFFER_RK4))
-    assert run.position[0, 0] == pytest.approx(fixed.body[0].position, abs=1e-14)
     assert fixed.body[0].angular_velocity == pytest.approx((0.0, 2.0, 0.0))
+
+
+def test_mujocos_model_of_a_file_with_a_held_base_begins_at_the_pose_of_the_scene(tmp_path):
+    fixed = imported(tmp_path, DOG, ImportOptions(hold=["trunk"], keyframe="high"))
+    run = engine("mujoco").run(fixed, np.array([0.0, 0.2]), setting_of(fixed, STIFFER_RK4))
+    assert run.position[0, 0] == pytest.approx(fixed.body[0].position, abs=ROUNDING)
 
 
 def test_hold_refuses_a_body_that_hangs_on_another_body(tmp_path):
     with pytest.raises(RequestError, match="--hold leg: is not a body that a joint connects to the ground"):
-        found(tmp_path, DOG, ImportOptions(hold=["leg"]))
+        imported(tmp_path, DOG, ImportOptions(hold=["leg"]))
 
 
 @pytest.mark.parametrize("name", ["heavy_top", "point_pendulum"])
@@ -241,10 +248,15 @@ def test_a_free_body_falls_freely_only_with_gravity_and_without_spin():
     assert not falls_freely(still.with_(gravity=(0.0, 0.0, 0.0)))
 
 
-def test_hold_adds_a_fixed_joint_to_a_scene_and_refuses_an_unknown_body():
+def test_hold_adds_a_fixed_joint_between_a_body_and_the_ground():
     scene = SCENES["four_bar_gravity"]()
-    fixed = held(scene, [scene.body[0].name])
-    assert fixed.joint[-1].type == "fixed" and fixed.joint[:-1] == scene.joint
+    name = scene.body[0].name
+    *others, joint = held(scene, [name]).joint
+    assert joint.type == "fixed" and set(joint.bodies) == {"ground", name} and tuple(others) == scene.joint
+
+
+def test_hold_refuses_an_unknown_body_of_a_scene():
+    scene = SCENES["four_bar_gravity"]()
     with pytest.raises(SceneError, match="--hold wheel: no such body; known: "):
         held(scene, ["wheel"])
 
@@ -261,7 +273,7 @@ def test_reading_a_file_reports_parts_left_out_and_closed_loops(tmp_path):
 def test_a_file_with_dry_friction_is_refused_with_the_option_that_leaves_it_out(tmp_path):
     text = FOUR_BAR.replace('damping="0.01"', 'frictionloss="0.1"')
     with pytest.raises(RequestError, match="dry friction of 'D': it changes the motion; --without friction"):
-        found(tmp_path, text)
+        imported(tmp_path, text)
 
 
 def test_a_missing_file_is_refused_by_its_name(tmp_path):

@@ -16,13 +16,14 @@ from crosscheck.judge.truth.reference_truth import trajectory
 SECONDS = 200.0
 QUICK = ("rccc", "rounded_platform", "pushed_dead_centre")
 ENDING = ("locking", "phased_crank")  # their motion ends before the scene's duration, in a dead centre
+ALIKE = 1e-15  # m or rad; differences of both formulations: integrated to 1e-16 and rounded to 1e-19
 LARGE = ("chain_of_twenty", "tumbling_chain")  # a run in thirty digits takes minutes
 SHORTER = {"stiff_chain": 0.3, "stiff_dampers": 0.2, "rounded_door": 0.5}  # s; duration of the test
 
 
 def error_over_bound(kind: str, seed: int) -> float:
-    """Return the largest error of the reference at five times over its bound, by a closed form or by a run in
-    thirty digits."""
+    """Return the largest error of the reference at five times over its bound, by a closed form or by a run
+    in thirty digits."""
     scene = awkward(kind, seed)
     times = np.linspace(0.0, SHORTER.get(kind, scene.duration), 5)
     motions = runs(scene, times, SECONDS)
@@ -54,6 +55,7 @@ def in_many_digits(scene, times):
 
 @pytest.mark.parametrize("kind", QUICK)
 def test_reference_of_an_awkward_mechanism_is_within_its_bound(kind):
+    """`error_over_bound` compares it with a closed form, or with a run in thirty digits."""
     assert error_over_bound(kind, 0) <= 1
 
 
@@ -69,15 +71,16 @@ def test_both_formulations_of_the_reference_agree_on_a_gimbal():
     scene, times = awkward("gimbal", 0), np.linspace(0.0, 0.12, 4)
     a, b = (move(scene, times, EXTENDED, seconds=SECONDS) for move in (natural_motion, tree_motion))
     assert not a.reason and not b.reason
-    assert differences(scene, a, b).max() < 1e-15
+    assert differences(scene, a, b).max() < ALIKE
 
 
 def test_collocation_steps_with_an_ill_conditioned_mass_matrix_are_accepted():
-    """Thirty freedoms, condition number 1e6. Before, formulation B found no step short enough in 0.03 s."""
+    """Thirty freedoms, condition number 1e6. Before, formulation B found no step short enough in 0.03 s;
+    fewer than ten are needed. Formulation A gives the motion, less exactly by the condition number."""
     scene, times = awkward("chain_of_twenty", 0), np.linspace(0.0, 0.03, 3)
     a, b = (move(scene, times, EXTENDED, seconds=SECONDS) for move in (natural_motion, tree_motion))
     assert not b.reason and b.steps < 10
-    assert 0 < differences(scene, a, b).max() < 1e-14
+    assert differences(scene, a, b).max() < 10 * ALIKE
 
 
 @pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.slow), 1])

@@ -50,7 +50,8 @@ def error_of(simulator, name: str, setting: Setting) -> float:
     "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in BY_HAND]
 )
 def test_equation_derived_by_hand_gives_the_true_motion(name: str):
-    """The engine LIMIT of benchmarks/limit.py integrates it. The truth is the judge's."""
+    """The engine LIMIT of benchmarks/limit.py integrates it at its finest setting. The judge has the truth:
+    a closed form, or a solution of its own equation."""
     from limit import LIMIT
 
     scene = SCENES[name]()
@@ -62,7 +63,7 @@ def test_equation_derived_by_hand_gives_the_true_motion(name: str):
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ["DOP853", "Radau"])
 def test_scipys_integrators_reach_the_true_motion_at_a_fine_tolerance(family: str):
-    """The error of positions and angles exceeds 1e-7 at a tolerance of 1e-5, and not at 1e-9."""
+    """Errors (m or rad) fall with the tolerance: above 1e-7 at a tolerance of 1e-5, and below it at 1e-9."""
     from general_integrators import SCIPY
 
     coarse, fine = (

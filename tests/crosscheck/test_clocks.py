@@ -55,6 +55,7 @@ def ticks(
 
 
 def test_cost_of_a_run_of_a_files_own_model_is_cpu_time(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the clock of `ticks`, building takes 1 s and stepping to three samples 3 s."""
     pendulum = '<body name="b"><joint type="hinge" axis="0 1 0"/><geom size="0.1" pos="0 0 -1"/></body>'
     path = tmp_path / "pendulum.xml"
     path.write_text(f"<mujoco><worldbody>{pendulum}</worldbody></mujoco>")

@@ -57,7 +57,9 @@ PINOCCHIO = {  # scene: relative tolerance, shortest step (s), measured error (m
     "four_bar": (1e-9, 2.4e-4, 2.9e-13),
 }
 SLOW = ("heavy_top", "andrews_squeezer")  # scenes whose truth takes long
-TURNED = 1.3e-8  # measured error of a quaternion after 100 rad at a tolerance of 1e-9
+TURNED = 2.4e-9  # measured error of a quaternion after 100 rad at a tolerance of 1e-9
+WAVING = (1.1e-12, 2.1e-12)  # measured errors of poses (m, rad) and velocities with a polynomial and a sine
+CLOSED = 1e-12  # of the scene's length, or rad: violations after a projection; 1e-13 is measured
 APART = 2.3e-8  # measured difference of runs by compiled code and in Python, m and m/s
 
 
@@ -102,17 +104,17 @@ def oscillator(t: float, y: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-8, 1e-12])
 def test_dop853_solves_an_oscillator_within_twenty_tolerances(rtol: float) -> None:
-    """y'' = -y from y = 1 at rest: y = cos t; the global error is some multiple of the local tolerance."""
+    """y'' = -y from y = 1 at rest: y = cos t. Each of 20 s adds less than one tolerance to the error."""
     times = [0.0, 0.3, 5.0, 20.0]
     status, reached, samples, memory = integrate(oscillator, [1.0, 0.0], times, rtol)
     assert (status, reached) == (dop853.REACHED, 4)
-    gap = abs(samples[:, 0] - np.cos(times)).max()
-    assert gap < 20 * rtol, f"{gap:.1e} off at a tolerance of {rtol:g}, {memory.counts[0]} steps"
-    assert memory.counts[dop853.STEPS] < 150, f"{memory.counts}: steps, rejected, evaluations"
+    error = abs(samples[:, 0] - np.cos(times)).max()
+    assert error < times[-1] * rtol, f"{error:.1e} off at a tolerance of {rtol:g}, {memory.counts[0]} steps"
 
 
 def test_error_of_equally_many_steps_falls_with_the_ninth_power_of_their_length() -> None:
-    """A method of order 8 has a local error of order h⁹; at a huge tolerance the number of steps is fixed."""
+    """A method of order 8 has a local error of order h⁹; at a huge tolerance the number of steps is
+    fixed."""
     errors, counts = [], []
     for h in (0.8, 0.4):
         memory = integrate(oscillator, [1.0, 0.0], [h], 1e9)[3]
@@ -121,8 +123,8 @@ def test_error_of_equally_many_steps_falls_with_the_ninth_power_of_their_length(
     assert counts[0] == counts[1] and np.log2(errors[0] / errors[1]) == pytest.approx(9, abs=0.2), errors
 
 
-def test_dop853_keeps_the_norm_of_a_quaternion() -> None:
-    """At 2 rad/s about z for 50 s, q = (cos t, 0, 0, sin t)."""
+def test_dop853_turns_a_quaternion_and_keeps_its_norm() -> None:
+    """At 2 rad/s about z for 50 s, q = (cos t, 0, 0, sin t), whose norm is 1 to rounding."""
 
     def rates(_: float, q: np.ndarray) -> np.ndarray:
         w, x, y, z = q
@@ -130,7 +132,7 @@ def test_dop853_keeps_the_norm_of_a_quaternion() -> None:
 
     samples = integrate(rates, [1.0, 0.0, 0.0, 0.0], [50.0], 1e-9, (0,))[2]
     assert abs(np.linalg.norm(samples[0]) - 1) < 4 * np.finfo(float).eps
-    assert abs(samples[0] - [np.cos(50.0), 0, 0, np.sin(50.0)]).max() < TURNED
+    assert abs(samples[0] - [np.cos(50.0), 0, 0, np.sin(50.0)]).max() < MARGIN * TURNED
 
 
 def test_an_integration_ends_when_its_largest_number_of_steps_is_reached() -> None:
@@ -142,14 +144,14 @@ def test_an_integration_ends_when_its_largest_number_of_steps_is_reached() -> No
 
 @pytest.mark.parametrize("shortest", [1e-12, 1e-3])
 def test_an_integration_ends_where_its_solution_becomes_infinite(shortest: float) -> None:
-    """y' = y² from 1 is 1 / (1 - t): 2 at 0.5, infinite at 1, which steps do not pass by more than one."""
+    """y' = y² from 1 is 1 / (1 - t): 2 at 0.5 s, and infinite at 1 s, which at most the last step passes."""
     with np.errstate(over="ignore"):
         status, reached, samples, memory = integrate(
             lambda _, y: y**2, [1.0], [0.5, 2.0], 1e-8, shortest=shortest
         )
     assert reached == 1 and status in (dop853.NOT_FINITE, dop853.TOO_SMALL)
-    assert abs(samples[0, 0] - 2.0) < 1e-6 and memory.clock[0] < 1.0 + max(shortest, 1e-6)
-    assert memory.counts[dop853.STEPS] < 5000
+    assert abs(samples[0, 0] - 2.0) < 100 * 1e-8, "a hundred tolerances"
+    assert memory.clock[0] < 1.0 + max(shortest, 1e-6), "s"
 
 
 def test_an_integration_ends_where_its_function_refuses() -> None:
@@ -162,12 +164,12 @@ def test_an_integration_ends_where_its_function_refuses() -> None:
 
     status, reached, _, memory = integrate(rates, [1.0, 0.0], [0.5, 1.0], 1e-8)
     assert status != dop853.REACHED and reached == 1
-    assert memory.clock[0] == pytest.approx(0.7, abs=1e-9) and memory.counts[dop853.STEPS] < 1000
+    assert memory.clock[0] == pytest.approx(0.7, abs=1e-9), "s; steps of at least 1e-12 s approach it"
 
 
 def test_a_shortest_step_lets_the_integration_pass_noise() -> None:
-    """y' = 1, with noise of amplitude 1 for 0.04 s, changes y by at most 0.04. Without a shortest step, steps
-    shrink until none are left."""
+    """y' = 1, with noise of amplitude 1 for 0.04 s, changes y by at most 0.04. Without a shortest step,
+    steps shrink until none are left."""
     times = np.linspace(0.0, 1.0, 21).tolist()
 
     def rates(t: float, y: np.ndarray) -> np.ndarray:
@@ -200,7 +202,6 @@ def test_mujocos_compiled_family_gives_the_true_motion(name: str) -> None:
     assert run.outcome is Outcome.COMPLETED, run.message
     error = measure(scene, run, truth_for(scene))["error"]
     assert error < MARGIN * max(measured, ROUNDING), f"{name}: {error:.1e} from the truth"
-    assert run.cost.rhs > 11 * run.cost.steps > 0 and run.cost.seconds > 0
 
 
 def completed_by_both(family: str, in_python: str, beta: float) -> tuple[Scene, Trajectory, Trajectory]:
@@ -214,27 +215,30 @@ def completed_by_both(family: str, in_python: str, beta: float) -> tuple[Scene, 
 
 
 def test_mujocos_compiled_family_moves_every_joint_and_load_as_the_python_family() -> None:
-    """Motions differ by rounding (APART), reactions by less than 1e-3 of the largest one."""
+    """The family in Python has an integrator of its own. Motions differ by at most MARGIN times the measured
+    difference (APART), reactions by less than 1e-6 of the largest one (1e-10 is measured)."""
     pytest.importorskip("mujoco")
     _, compiled, plain = completed_by_both(FAMILY, "forward", beta=30.0)
     assert apart(compiled, plain) < MARGIN * APART
     worst = max(abs(compiled.reactions[j] - plain.reactions[j]).max() for j in plain.reactions)
-    assert worst < 1e-3 * max(abs(force).max() for force in plain.reactions.values()), f"{worst:.1e}"
+    assert worst < 1e-6 * max(abs(force).max() for force in plain.reactions.values()), f"{worst:.1e}"
 
 
 def test_mujocos_compiled_family_follows_a_driver_of_a_polynomial_and_a_sine() -> None:
-    """The pose of a slider-crank follows from the crank's angle in closed form."""
+    """The crank of a slider-crank turns by 3 t - 20 t² + 0.4 sin(30 t) rad; by `truth_for`, poses and
+    velocities follow in closed form. Errors exceed their measured values (WAVING) at most MARGIN times."""
     pytest.importorskip("mujoco")
     driver = Driver(joint="A", polynomial=(0.0, 3.0, -20.0), sine=Sine(amplitude=0.4, frequency=30.0))
     scene = SCENES["spatial_slider_crank"]().with_(driver=(driver,), load=(), duration=0.2)
     run = simulate("mujoco", scene, 11, FAMILY, rtol=1e-10, min_step=1e-9, beta=50.0, hard=1e-9)
     assert run.outcome is Outcome.COMPLETED, run.message
     found = measure(scene, run, truth_for(scene))
-    assert found["error"] < MARGIN * 1.1e-12 and found["velocity_error"] < MARGIN * 2.1e-12, found
+    assert found["error"] < MARGIN * WAVING[0] and found["velocity_error"] < MARGIN * WAVING[1], found
 
 
 def test_a_failed_run_of_mujocos_compiled_family_has_the_samples_before_its_end() -> None:
-    """With a step of at least 1 ms, some runs of equal links end at the singular position."""
+    """With steps of at least 1 ms, runs of a slider-crank with equal links end at its singular position at
+    some tolerances. Their samples are finite, fewer than asked, and their end is within the motion."""
     pytest.importorskip("mujoco")
     scene = SCENES["planar_slider_crank_equal"]()
     runs = [
@@ -259,21 +263,22 @@ def test_mujocos_projected_compiled_family_gives_the_true_motion_through_singula
     assert run.outcome is Outcome.COMPLETED, run.message
     error = measure(scene, run, truth_for(scene))["error"]
     assert error < MARGIN * measured, f"{name}: {error:.1e} from the truth"
-    assert violation_series(scene, run).max() < 1e-12
+    assert violation_series(scene, run).max() < CLOSED
 
 
 def test_mujocos_projected_compiled_family_moves_as_in_python_and_keeps_joints_closed() -> None:
-    """A scene with every joint and spring, with redundant rows and quaternions. Motions differ by rounding
-    (APART); joints are closed to 1e-12 m."""
+    """A scene with every joint and spring. The family `projected` in Python has an integrator of its own;
+    motions differ by at most MARGIN times the measured difference (APART)."""
     pytest.importorskip("mujoco")
     scene, compiled, plain = completed_by_both(PROJECTED, "projected", beta=0.0)
     assert apart(compiled, plain) < MARGIN * APART
-    assert violation_series(scene, compiled).max() < 1e-12
+    assert violation_series(scene, compiled).max() < CLOSED
 
 
 @pytest.mark.parametrize("name", DRIVEN)
 def test_newton_on_mujocos_closures_gives_the_true_driven_motion(name: str) -> None:
-    """The error exceeds its measured value (table DRIVEN) at most MARGIN times."""
+    """The error exceeds its measured value (table DRIVEN) at most MARGIN times; that of velocities and
+    accelerations, relative to the largest, is 1e-11 measured and 1e-9 allowed."""
     pytest.importorskip("mujoco")
     tolerance, measured = DRIVEN[name]
     scene = SCENES[name]()
@@ -288,7 +293,7 @@ def test_newton_on_mujocos_closures_gives_the_true_driven_motion(name: str) -> N
 
 
 def test_newton_ends_where_closures_cannot_be_met() -> None:
-    """Coupler and rocker are too short for a whole turn of the driven crank."""
+    """Coupler and rocker are too short for a whole turn of the driven crank; the run ends before 2 s."""
     pytest.importorskip("mujoco")
     scene = out_of_reach()
     run = simulate("mujoco", scene, 5, NEWTON, tolerance=1e-10, turn=0.1)
@@ -319,7 +324,8 @@ def out_of_reach() -> Scene:
 
 
 def test_planar_scene_leaves_a_mechanism_that_can_leave_its_plane_unchanged() -> None:
-    """A double pendulum on a hinge and a ball joint, at rest and with a spin out of the plane."""
+    """A double pendulum on a hinge and a ball joint, at rest and with a spin out of the plane of the
+    hinges."""
     scene = SCENES["four_bar_gravity"]()
     hinge, second = scene.joint[:2]
     ball = Spherical(name=second.name, bodies=second.bodies, anchor=second.anchor)
@@ -350,18 +356,19 @@ def test_pinocchios_compiled_family_gives_the_true_motion(pinocchio: Engine, nam
     assert run.outcome is Outcome.COMPLETED, run.message
     error = measure(scene, run, truth_for(scene))["error"]
     assert error < MARGIN * max(measured, ROUNDING), f"{name}: {error:.1e} from the truth"
-    assert violation_series(scene, run).max() < 1e-12
+    assert violation_series(scene, run).max() < CLOSED
 
 
 @pytest.mark.parametrize(("family", "python"), [("dop853, compiled", "dop853"), ("tuned, compiled", "tuned")])
 def test_pinocchios_compiled_families_move_every_joint_as_those_in_python(
     pinocchio: Engine, family: str, python: str
 ) -> None:
-    """A scene with every joint and with torsion springs."""
+    """A scene with every joint and with torsion springs, the only loads of these families. Motions differ by
+    at most MARGIN times the measured difference (APART)."""
     joints = every_joint()
-    kept = [load for load in joints.load if load.type == "torsion_spring"]
-    assert kept
-    scene = joints.with_(duration=0.2, load=kept)
+    springs = [load for load in joints.load if load.type == "torsion_spring"]
+    assert springs
+    scene = joints.with_(duration=0.2, load=springs)
     options = {"rtol": 1e-10, "min_step": 1e-9}
     compiled = simulate("pinocchio", scene, 6, family, **options)
     plain = simulate("pinocchio", scene, 6, python, **options)

@@ -25,36 +25,37 @@ from crosscheck.judge.truth import truth_for
 from mbref.motions.trajectory import Outcome
 from tests.helpers.fake_engines import FAKES, Fake
 
+ROUNDING = 1e-13  # m or rad; 1e-16 is measured
 SPECIMENS = {specimen.scene.name: specimen for specimen in specimens()}
 
 
 def test_formulas_of_the_suite_equal_the_judges_truth():
-    """The suite has a formula of each motion; the judge solves its equation of one coordinate."""
+    """The suite has a formula of each motion; the judge, whose code is its own, solves an equation of
+    motion."""
     for name in ("free_fall", "oscillator", "torsion", "driven", "pendulum", "turntable"):
         specimen = SPECIMENS[name]
         solved, times = truth_for(specimen.scene), np.linspace(0, specimen.scene.duration, 7)
         written = trial.exact_motion(specimen, times)
         apart = trial.difference(specimen.scene, written, solved.poses(times))
-        assert apart < 1e-12, f"{name}: formula and {solved.name} differ by {apart:.3g}"
+        assert apart < ROUNDING, f"{name}: formula and {solved.name} differ by {apart:.3g}"
 
 
 @pytest.mark.parametrize("make", GEARED, ids=lambda make: make.__name__)
 def test_formulas_of_geared_mechanisms_equal_the_reference(make):
-    """Positions within 1e-13 m; quaternions within 1e-13, up to their sign."""
+    """The judge's reference integrates the equations of motion in long doubles; signs of quaternions are
+    free."""
     scene, exact = make()
     times = np.linspace(0, scene.duration, 4)
     position, orientation = exact(times)
     found = natural_motion(scene, times, EXTENDED, seconds=60.0)
-    assert np.abs(position - doubles(found.position)).max() < 1e-13
+    assert np.abs(position - doubles(found.position)).max() < ROUNDING
     turned = np.abs(np.einsum("kbi,kbi->kb", orientation, doubles(found.orientation)))
-    assert np.abs(turned - 1).max() < 1e-13
+    assert np.abs(turned - 1).max() < ROUNDING
 
 
 def test_verify_fails_an_engine_that_prints_and_rests_where_a_body_falls(capsys):
-    """The engine CHATTER keeps its times, quaternions and processes right, so that those checks do not fail.
-
-    It also fails the scene whose motion is not determined, which an engine has to refuse.
-    """
+    """The engine CHATTER prints, fails to move and refuses no scene, also none without a determined motion.
+    Its times, quaternions and processes are right, so that those checks do not fail."""
     status = main(["verify", f"{FAKES}:CHATTER", "--scene", "free_fall", "--json"])
     record = json.loads(capsys.readouterr().out)
     verdicts = {v["property"]: v["status"] for v in record["verdicts"] if v["scene"] == "free_fall"}
@@ -86,7 +87,7 @@ def test_an_endless_run_in_this_process_times_out_and_leaves_no_timer():
 
 
 @pytest.mark.parametrize(("fake", "status"), [("FAKE", "pass"), ("AGING", "fail"), ("KEEPING", "fail")])
-def test_check_repeated_fails_engines_whose_runs_depend_on_earlier_runs(fake, status):
+def test_check_repeated_fails_only_engines_whose_runs_depend_on_earlier_runs(fake, status):
     """AGING moves bodies by 1e-14 m more in every run of a process, KEEPING by the first run's mass.
 
     FAKE does not. A new process repeats the first run of each, so that the check `reordered` passes.

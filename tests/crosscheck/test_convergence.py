@@ -32,6 +32,7 @@ def runs(power: float, floor: float, count: int = 12) -> list[dict]:
 
 @pytest.mark.parametrize("power", [1.0, 2.0, 4.0])
 def test_order_is_the_power_of_the_step_in_errors_above_their_floor(power: float) -> None:
+    """Errors are step**power + 1e-9; the floor of 1e-9 bends the line by less than 0.05."""
     assert order(runs(power, 1e-9)) == pytest.approx(power, abs=0.05)
 
 
@@ -58,8 +59,9 @@ def test_cell_shows_the_least_error_and_the_order() -> None:
     assert cell([{"outcome": "REFUSED"}]) == "–" and cell([]) == "○"
 
 
-def test_runs_count_as_vain_while_none_lowers_the_least_error() -> None:
-    """An error of 0.5 and more is no right motion; a smaller tolerance with as many steps is no finer run."""
+def test_finer_runs_are_counted_in_vain_while_none_lowers_the_least_error() -> None:
+    """A ladder of runs ends after VAIN of them. Runs before the first error below 0.5, and runs with as many
+    steps as the run before, do not count."""
     assert in_vain(runs(4.0, 1e-6)[:3]) == 0
     assert in_vain([run(0.1, 0.5), run(0.05, 0.9), run(0.02, 0.8)]) == 0
     found = [run(0.1, 1e-6), run(0.05, 0.8e-6), run(0.02, 0.9e-6)]
@@ -77,7 +79,8 @@ def test_steps_of_a_ladder_are_halved_and_divide_the_interval_of_samples() -> No
 
 
 def test_a_ladder_ends_where_finer_runs_are_vain_or_would_take_too_long() -> None:
-    """Errors 1e4 h⁴ + 1e-10 reach their floor; runs of 1.5 s would take 3 s at half the step."""
+    """Errors 1e4 h⁴ + 1e-10 reach their floor of 1e-10, after which VAIN runs follow. A run of 1.5 s would
+    take 3 s at half the step, too long, so that it is the last."""
     cases = ladder(TUNED_MUJOCO, BENNETT)
 
     def fourth(case: Case) -> dict:

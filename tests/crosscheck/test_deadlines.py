@@ -61,9 +61,9 @@ def test_search_for_a_reference_ends_at_its_limit_of_cpu_time(name):
 
 
 def test_reference_passes_the_singular_position_of_an_uneven_five_bar():
-    """The driven five-bar is singular near 0.0126 s. There its coordinates depend on lengths by square roots:
-    errors of 1e-8 m move bodies by up to √1e-8 m from the closed form of the exact five-bar. Before, the run
-    ended at 0.01259 s."""
+    """The driven five-bar is singular near 0.0126 s. There its coordinates depend on lengths by square
+    roots: errors of 1e-8 m move bodies by up to √1e-8 m from the closed form of the exact five-bar. Before,
+    the run ended at 0.01259 s."""
     times = np.array([0.0125, 0.0126, 0.0127])
     motion = natural_motion(uneven_five_bar(), times, EXTENDED, seconds=20.0)
     assert not motion.reason and list(motion.times) == list(times), f"{motion.reason} at {motion.reached} s"
@@ -72,6 +72,7 @@ def test_reference_passes_the_singular_position_of_an_uneven_five_bar():
 
 
 def test_computation_of_a_certified_table_ends_at_its_limit_of_cpu_time():
+    """It raises NotCertified with that reason, within twice the limit of 1 s and 2 s of set-up."""
     pytest.importorskip("flint")
     scene = SCENES["andrews_squeezer"]()
 
@@ -84,7 +85,8 @@ def test_computation_of_a_certified_table_ends_at_its_limit_of_cpu_time():
 
 
 def test_the_nearer_of_two_nested_limits_counts():
-    """A limit of -1 s has passed already, outside and inside a limit of 100 s; afterwards it is forgotten."""
+    """A limit of -1 s has passed already, outside and inside a limit of 100 s; afterwards it is
+    forgotten."""
     with within(100.0):
         with within(-1.0), pytest.raises(TimeIsUp):
             ask()

@@ -108,7 +108,8 @@ def test_reason_names_an_undeclared_driver_of_a_declared_joint() -> None:
 
 @pytest.mark.parametrize("kind", JOINT_TYPES)
 def test_a_joint_has_as_many_rows_in_all_equations_as_its_facts_say(kind: str) -> None:
-    """Rows of mbref and of adapters, rank of the judge's Jacobian, and freedoms that a tree joint removes."""
+    """Rows of mbref and of adapters, rank of the judge's Jacobian, and freedoms that a tree joint
+    removes."""
     joint, facts = JOINTS[kind], JOINT_TYPES[kind].facts
     scene = Scene(name="one", body=(BODY,), joint=(joint,))
     assert facts.rows + facts.free_translations + facts.free_rotations == 6, facts

@@ -44,13 +44,18 @@ def expected(angle: float, rate: float, moment: float = 0.0) -> np.ndarray:
 
 @pytest.mark.parametrize("moment", [0.0, 7.0])
 def test_symbolic_equations_of_a_crane_give_its_accelerations(moment: float) -> None:
-    """At x = 0.7 m, φ = 0.3 rad and their rates 1.1 and 1.2; without loops, ``settled`` changes no state."""
+    """At x = 0.7 m, φ = 0.3 rad and their rates 1.1 and 1.2, by Lagrange's equations of `expected`; the
+    moment of 7 N m about z acts on φ, its parts about x and y do not."""
     load = (Moment(body="rod", moment=(5.0, 6.0, moment)),) if moment else ()
     equations = TreeEquations(crane(load=load))
-    assert equations.n == 2 and equations.rows == [] and equations.has_own_joints
-    assert equations.start.tolist() == [0.0] * 4
     found = equations.accelerations([0.7, 0.3], [1.1, 1.2], NUMBERS, 0.5)
     assert found.astype(float) == pytest.approx(expected(0.3, 1.2, moment))
+
+
+def test_coordinates_of_a_mechanism_without_loops_are_settled_already() -> None:
+    """``settled`` closes loops; the crane has no rows of loops, and keeps its two coordinates and rates."""
+    equations = TreeEquations(crane())
+    assert equations.n == 2 and equations.rows == []
     q, v = equations.settled([0.7, 0.3], [1.1, 1.2], NUMBERS)
     assert q.tolist() == [0.7, 0.3] and v.tolist() == [1.1, 1.2]
 
@@ -127,7 +132,8 @@ def forces(
 def test_torsion_spring_of_an_adapter_counts_the_full_turns_of_an_estimated_angle(
     turns: float, angle: float
 ) -> None:
-    """The pose gives an angle of 0 up to full turns; the estimate (for example 6 rad) gives their number."""
+    """The pose gives an angle of 0 up to full turns, and the estimate (0, 6 or -13 rad) their number: 0, 1,
+    -2. The moment is -k (φ - 0.25) - c φ', less the gyroscopic moment ω × J ω."""
     spring = TorsionSpring(joint="H", stiffness=4.0, damping=0.5, natural_angle=0.25)
     found = forces(spring, omega=(7.0, 8.0, 3.0), angle=turns)
     gyroscopic = -np.cross([7.0, 8.0, 3.0], [7.0, 16.0, 9.0])

@@ -11,6 +11,7 @@ from tests.crosscheck.driven_arm import END, ENGINES, SLIDE, TURN, able, driven_
 
 TIMES = np.array([0.0, 0.4 * END, END])
 WITHIN = 2e-3  # rad and m; exchanged phases, frequencies or drivers move the bodies by more than 8e-3
+RATES = 10 * WITHIN  # rad/s and m/s; drivers of 5 and 9 rad/s magnify errors of the coordinate by as much
 ROUGH = ("cpodes",)  # off by more than 8e-3 on a prescribed motion; it runs the model of the other families
 
 
@@ -26,9 +27,11 @@ def test_an_engine_follows_drivers_that_turn_an_arm_and_slide_a_block_along_it(n
     slid = speed[:, None] * out + (along * rate)[:, None] * across
     velocity = np.stack([0.5 * rate[:, None] * across, slid], axis=1)
     spin = np.stack([0 * rate, 0 * rate, rate], axis=-1)[:, None].repeat(2, axis=1)
-    for setting in (s for s in middle(name, scene, part) if s.family not in ROUGH):
+    settings = [s for s in middle(name, scene, part) if s.family not in ROUGH]
+    assert settings, "no family is tested"
+    for setting in settings:
         run = engine(name).run(scene, TIMES, setting)
         assert run.outcome is Outcome.COMPLETED, (setting, run.message)
         assert abs(run.position - position).max() < WITHIN, setting
-        assert abs(run.velocity - velocity).max() < 10 * WITHIN, setting
-        assert abs(run.angular_velocity - spin).max() < 10 * WITHIN, setting
+        assert abs(run.velocity - velocity).max() < RATES, setting
+        assert abs(run.angular_velocity - spin).max() < RATES, setting

@@ -57,7 +57,8 @@ def test_a_force_works_along_the_path_of_its_point():
 
 @pytest.mark.parametrize("hinge", [True, False])
 def test_a_moment_works_along_the_angle_of_a_hinge_or_of_a_free_body(hinge):
-    """2 N m over 0.5 rad: by the hinge's angle, or on a free body by the power at the samples."""
+    """2 N m over angles of 0.25 and 0.5 rad are 0.5 and 1 J, which a body with constant energy lacks: by the
+    hinge's angle, or on a free body by the power 2 N m · 0.5 rad/s at samples 0.5 s apart."""
     spin = np.full((3, 1, 3), (0.0, 0.0, 0.5))
     body = scene().body[0].model_copy(update={"angular_velocity": (0.0, 0.0, 0.5)})
     of = scene(Moment(body="b", moment=(0.0, 0.0, 2.0)), hinge=hinge).with_(body=(body,))
@@ -66,8 +67,6 @@ def test_a_moment_works_along_the_angle_of_a_hinge_or_of_a_free_body(hinge):
     if hinge:
         velocity[:, 0] = [(-p[1] * 0.5, p[0] * 0.5, 0.0) for p in places]
     run = still(*places, angles=(0.0, 0.25, 0.5), angular_velocity=spin, velocity=velocity)
-    start = energy_drift(of, still(*places[:1], angular_velocity=spin[:1], velocity=velocity[:1]))
-    assert start == pytest.approx([0.0], abs=1e-12)
     assert drift(of, run) == pytest.approx([0.0, 0.5, 1.0], abs=1e-12)
 
 

@@ -13,11 +13,7 @@ from crosscheck.judge.equations_of_motion import PARTS, terms_at, variants
 from crosscheck.judge.equations_of_motion import accelerations as of_terms
 from crosscheck.judge.gauss_motion import accelerations, gauss_motion
 from crosscheck.judge.joint_loads import joint_wrenches, turning_loads
-from crosscheck.judge.joint_residuals import (
-    joint_frames,
-    position_rows,
-    with_ground,
-)
+from crosscheck.judge.joint_residuals import joint_frames, position_rows, with_ground
 from crosscheck.judge.loads import Motion, wrenches
 from mbref import rotations
 from mbref.scene import (
@@ -159,7 +155,9 @@ SAMPLED = 0.2 * np.arange(6)  # s
 
 @pytest.mark.parametrize(("rate", "known"), [(15.6, 6), (15.8, 3)])
 def test_turns_are_unknown_where_rates_near_a_step_differ_by_half_a_turn(rate, known):
-    """The last rate times 0.2 s is 3.12 or 3.16 rad, below or above π; it counts for two samples before."""
+    """Six samples 0.2 s apart at angle 0. The last rate times 0.2 s is 3.12 or 3.16 rad: below or above π,
+    half a turn. Above it, the last step and the two before, whose rates are estimated from it, have unknown
+    turns."""
     found = joint_coordinates.counted(SAMPLED, 0 * SAMPLED, np.array([0.0, 0.0, 0.0, 0.0, 0.0, rate]))
     assert np.isnan(found).tolist() == [False] * known + [True] * (6 - known)
 
@@ -186,7 +184,8 @@ def hinged(load) -> Scene:
 
 
 def test_a_torsion_spring_has_opposite_moments_about_its_joint_or_a_common_axis():
-    """4 N m/rad · (0.7 - 0.2) rad + 0.5 N m s/rad · 3 rad/s = 3.5 N m."""
+    """4 N m/rad · (0.7 - 0.2) rad + 0.5 N m s/rad · 3 rad/s = 3.5 N m, by `joint_wrenches`, and for a planar
+    motion by `wrenches` about its axis, whose sense is free."""
     scene = hinged((TorsionSpring(joint="J", stiffness=4.0, damping=0.5, natural_angle=0.2),))
     still = np.zeros((2, 3))
     spins = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 4.0]])
@@ -299,8 +298,8 @@ def test_variants_of_the_mass_matrix_take_the_inertia_about_wrong_axes():
 
 
 def test_a_massless_link_does_not_change_the_acceleration_of_a_pendulum():
-    """A pendulum of 2 kg and 0.5 kg m² at 1 m falls with 18 / 2.5 rad/s²; a massless link before it changes
-    nothing."""
+    """A pendulum of 2 kg and 0.5 kg m² at 1 m falls with 18 / 2.5 = 7.2 rad/s², alone and welded to a
+    massless link that is hinged to the ground."""
     scene = pendulum().with_(load=())
     state = at_state(scene)
     assert accelerations(scene, 0.0, state)[0] == pytest.approx([0.0, -7.2, 0.0, 0.0, 0.0, -7.2], abs=1e-12)

@@ -23,7 +23,8 @@ LOOSE = Setting("mpi-svd+projection", {"rtol": 1e-4})
 
 
 def test_error_that_mbref_estimates_equals_the_error_against_the_truth():
-    """Within 0.1 %; the record of a study has both."""
+    """Within 0.1 %, as mbref compares the run at a tolerance of 1e-4 with one at a much smaller tolerance.
+    The truth is the judge's."""
     record = run_case(Case(SCENE, TIMES, "mbref", LOOSE))
     found = record["error_estimate"]
     assert found["largest"] == max(found["error"]) and len(found["error"]) == len(TIMES)
@@ -32,7 +33,7 @@ def test_error_that_mbref_estimates_equals_the_error_against_the_truth():
 
 
 def test_an_estimate_that_needs_more_than_its_time_is_left_out_and_the_run_is_unchanged():
-    """The limit is 0 s."""
+    """The limit is 0 s; the positions equal those of a run without estimate."""
     run = serve.run_estimated("mbref", SCENE, TIMES, LOOSE, 0.0)
     found = run.to_record()["error_estimate"]
     assert found["largest"] is None and "more than 0 s" in found["reason"]

@@ -46,7 +46,7 @@ def held_acceleration(model, data) -> np.ndarray:
     return free - inverse @ np.linalg.pinv(jacobian @ inverse, rcond=1e-9) @ (jacobian @ free)
 
 
-def acceleration_gap(scene: Scene, model) -> float:
+def acceleration_difference(scene: Scene, model) -> float:
     """Return the largest difference of accelerations of centres of mass at rest at qpos0, by mbref and by
     MuJoCo's matrices, over the largest acceleration, which is above 0.1 m/s²."""
     start = simulate(scene, "mpi-svd+projection", [0.0])
@@ -83,19 +83,26 @@ def in_frames_of(scene: Scene, trajectory: Trajectory, own: Scene) -> Trajectory
 
 
 def difference(scene: Scene, again: Scene) -> Difference | None:
-    """Return the difference of poses and changes of velocity of two scenes by the judge's check of models."""
+    """Return the difference of poses and changes of velocity of two scenes by the judge's check of
+    models."""
     runs = [simulate(s, "mpi-svd+projection", gate_times(scene)) for s in (scene, again)]
     return gate(scene, [runs[0], in_frames_of(scene, runs[1], again)])
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_scene_of_an_mjcf_file_accelerates_as_mujocos_matrices_say(name):
+    """Accelerations at rest, by mbref from the scene and by the equations of MuJoCo's own model of the
+    file."""
     scene = formats.read(MODELS / f"{name}.xml").scene
-    assert acceleration_gap(scene, mujoco.MjModel.from_xml_path(str(MODELS / f"{name}.xml"))) < MARGIN * ALIKE
+    assert (
+        acceleration_difference(scene, mujoco.MjModel.from_xml_path(str(MODELS / f"{name}.xml")))
+        < MARGIN * ALIKE
+    )
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "slider_crank"])
-def test_an_mjcf_file_written_and_read_again_is_the_mechanism(name, tmp_path):
+def test_an_mjcf_file_written_and_read_again_moves_as_before(name, tmp_path):
+    """`difference` is the judge's check of models: poses, and changes of velocity over a short time."""
     scene = formats.read(MODELS / f"{name}.xml").scene
     formats.write(scene.with_(driver=()), tmp_path / "again.xml")
     again = formats.read(tmp_path / "again.xml").scene
@@ -109,19 +116,24 @@ def test_bodies_welded_by_an_equality_are_one_body_after_a_round_trip(tmp_path):
     assert {body.name for body in again.scene.body} == {"crank", "rod", "pin", "piston (share 4)"}
     assert "fixed to 'pin' and part of it: 'piston'" in again.notes
     assert (
-        acceleration_gap(again.scene, mujoco.MjModel.from_xml_path(str(tmp_path / "again.xml")))
+        acceleration_difference(again.scene, mujoco.MjModel.from_xml_path(str(tmp_path / "again.xml")))
         < MARGIN * ALIKE
     )
 
 
 @pytest.mark.parametrize("name", EXPORTED)
-def test_an_exported_scene_is_the_mechanism_in_mujoco_and_when_read_again(name, tmp_path):
+def test_an_exported_scene_accelerates_in_mujoco_and_moves_when_read_again_as_the_scene(name, tmp_path):
+    """MJCF has no drivers and no start velocities, so that the scene begins at rest, with a gravity of its
+    own."""
     scene = find_scene(name)
     loads = [load for load in scene.load if load.type in ("spring", "torsion_spring")]
     bodies = [b.model_copy(update={"velocity": None, "angular_velocity": None}) for b in scene.body]
     scene = scene.with_(driver=(), load=loads, body=bodies, gravity=(0.5, -9.0, 3.0))
     formats.write(scene, tmp_path / "scene.xml")
-    assert acceleration_gap(scene, mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml"))) < MARGIN * ALIKE
+    assert (
+        acceleration_difference(scene, mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml")))
+        < MARGIN * ALIKE
+    )
     assert difference(scene, formats.read(tmp_path / "scene.xml").scene) is None
 
 
@@ -147,6 +159,7 @@ def test_a_body_without_a_joint_is_part_of_its_parent():
 
 
 def test_a_joint_that_an_equality_holds_has_a_driver_that_keeps_it_at_zero():
+    """In the file, an equality with one joint, s2, holds it at its reference."""
     scene = formats.read(MODELS / "stewart_legs.xml").scene
     assert [driver.joint for driver in scene.driver] == ["s2"] and scene.driver[0].polynomial == (0.0,)
 
@@ -246,7 +259,7 @@ def test_import_writes_a_scene_that_export_writes_as_mjcf(tmp_path, capsys):
     assert main(["export", str(tmp_path / "five.toml"), "--out", str(tmp_path / "five.xml")]) == 0
     again = formats.read(tmp_path / "five.xml").scene
     five = Scene.from_file(tmp_path / "five.toml")
-    assert mbref.counts(again) == mbref.counts(five), "also the names of joints"
+    assert mbref.counts(again) == mbref.counts(five), "bodies, rows and freedoms"
 
 
 def test_export_refuses_an_unknown_format_and_import_a_missing_file(tmp_path, capsys):

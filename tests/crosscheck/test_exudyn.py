@@ -48,7 +48,8 @@ def hinge(kind: type = Revolute, bodies: tuple[str, str] = ("ground", "b")) -> d
 
 
 def moment_of_inertia(scene: Scene) -> float:
-    """Return the moment of inertia (kg m²) about SIDEWAYS through the origin, at a right angle to the arm."""
+    """Return the moment of inertia (kg m²) about SIDEWAYS through the origin, at a right angle to the
+    arm."""
     turn = rotations.to_matrix(np.array(TURNED))
     axis = np.array(SIDEWAYS)
     return float(axis @ turn @ np.array(INERTIA) @ turn.T @ axis) + scene.body[0].mass * 0.2**2
@@ -94,7 +95,8 @@ def test_exudyns_families_move_mechanisms_within_their_measured_errors(
 
 
 def test_exudyns_trapezoidal_rule_has_order_two_and_extrapolation_more_than_five():
-    """The order is the logarithm of the errors' ratio at 2 and 1 ms."""
+    """The order is the binary logarithm of the errors' ratio at 2 and 1 ms. The rule's error has even powers
+    of the step alone, of which extrapolation removes two: order six, 5.7 at these steps."""
     scene = SCENES["spatial_slider_crank_gravity"]()
     times, truth = np.linspace(0, 0.1, 6), truth_for(scene)
     errors = {
@@ -109,6 +111,8 @@ def test_exudyns_trapezoidal_rule_has_order_two_and_extrapolation_more_than_five
 
 
 def test_exudyn_gives_the_true_accelerations():
+    """The judge's truth of a slider-crank; differences are relative to the largest acceleration
+    (ACCELERATION)."""
     scene = SCENES["planar_slider_crank_gravity"]()
     trajectory = run(scene, np.linspace(0, 0.1, 6), "tuned", 1e-4)
     exact = truth_for(scene).poses(trajectory.times)
@@ -135,14 +139,17 @@ def test_exudyn_swings_a_body_on_a_torsion_spring_beyond_a_turn(kind: type, bodi
 
 
 def test_exudyn_keeps_joints_of_every_kind_closed():
-    """Residuals of the judge's joint equations, in a scene with and without drivers."""
+    """Residuals of the judge's joint equations and their rates (OPEN), in a scene with and without
+    drivers."""
     for scene in (every_joint(), driven()):
         measured = measure(scene, run(scene, np.linspace(0, 0.2, 6), "tuned", 2.5e-3))
         assert measured["violation_position"] < MARGIN * OPEN[0], (scene.name, measured)
         assert measured["violation_velocity"] < MARGIN * OPEN[1], (scene.name, measured)
 
 
-def test_exudyn_turns_a_torque_free_body_as_the_truth():
+def test_exudyn_tumbles_a_torque_free_body_as_the_truth():
+    """The judge knows the motion of a body under gravity alone; MARGIN times the measured error is
+    allowed."""
     body = Body(
         name="top",
         mass=2.0,
@@ -162,14 +169,16 @@ def test_exudyns_motion_does_not_depend_on_the_samples():
     scene = SCENES["planar_slider_crank_gravity"]()
     even = np.linspace(0, 0.1, 11)
     some = even[[3, 4, 8, 10]]
-    for family, tolerance in (("tuned", MARGIN * 2.7e-14), ("alpha", MARGIN * 1.4e-9)):
+    measured = {"tuned": 2.7e-14, "alpha": 1.4e-9}  # m; Newton's method of `alpha` ends earlier
+    for family, tolerance in measured.items():
         dense, sparse = run(scene, even, family, 1e-4), run(scene, some, family, 1e-4)
         off = np.abs(dense.position[[3, 4, 8, 10]] - sparse.position).max()
-        assert off < tolerance, f"{family} off by {off:.2e} m"
+        assert off < MARGIN * tolerance, f"{family} off by {off:.2e} m"
 
 
 def test_exudyns_defaults_end_at_redundant_constraints_with_the_cause():
-    """Its solver finds zero initial accelerations and a singular matrix; the start is the only sample."""
+    """In a planar mechanism in space its matrix is singular, and it finds zero initial accelerations, as the
+    message says; the start is the only sample."""
     scene = SCENES["planar_slider_crank"]()
     trajectory = ENGINE.run(scene, np.linspace(0, 0.1, 11), Setting("defaults", {"step": 1e-3}))
     assert trajectory.outcome is Outcome.SINGULAR_MATRIX, (trajectory.outcome, trajectory.message)
@@ -177,19 +186,23 @@ def test_exudyns_defaults_end_at_redundant_constraints_with_the_cause():
     assert len(trajectory.times) == 1, trajectory.times
 
 
-def test_exudyn_ends_at_a_singular_position_with_right_samples_before_it():
+def test_exudyns_trapezoidal_rule_ends_at_a_singular_position_with_right_samples_before_it():
+    """The slider-crank with equal links is singular at 0.0612 s; samples are 10 ms apart. The run ends
+    within ten steps of 0.1 ms of it, and the samples up to 0.06 s are off by at most MARGIN times the
+    measured error."""
     scene = SCENES["planar_slider_crank_equal"]()
     trajectory = ENGINE.run(scene, np.linspace(0, 0.1, 11), Setting("trapezoidal", {"step": 1e-4}))
     assert trajectory.outcome is Outcome.NOT_CONVERGED, (trajectory.outcome, trajectory.message)
     singular = 0.0612  # s, where the crank has turned to π/2
-    assert abs(trajectory.t_end - singular) < MARGIN * 1e-4, trajectory.t_end
+    assert abs(trajectory.t_end - singular) < 10 * 1e-4, trajectory.t_end
     assert trajectory.times[-1] == pytest.approx(0.06), trajectory.times
     measured = measure(scene, trajectory, truth_for(scene))
     assert measured["error"] < MARGIN * BEFORE, measured
 
 
 def test_exudyns_static_analysis_ends_before_a_singular_pose():
-    """The crank reaches θ = π at 1 s, where the driven parallelogram can take two branches."""
+    """The crank reaches θ = π at 1 s, where the driven parallelogram can take two branches; the run ends
+    within two of its steps of 0.05 s before it."""
     quarter = math.pi / 2
     scene = SCENES["four_bar"]()
     scene = scene.with_(driver=(Driver(joint="A", polynomial=(0.0, -quarter)),))

@@ -33,6 +33,8 @@ SINGULAR = 0.061192068340  # s, where the equal slider-crank's crank has turned 
 def test_exudyn_moves_through_singular_positions_within_its_measured_errors(
     name: str, duration: float, step: float, errors: tuple[float, float]
 ):
+    """Poses by the judge's truth, and rates of joints by its joint equations; at most MARGIN times
+    measured."""
     scene = SCENES[name]()
     run = ENGINE.run(scene, np.linspace(0, duration, 14), Setting("tuned", {"step": step}))
     assert run.outcome is Outcome.COMPLETED, run.message
@@ -42,6 +44,8 @@ def test_exudyn_moves_through_singular_positions_within_its_measured_errors(
 
 
 def test_exudyns_samples_at_and_next_to_a_singular_position_are_true():
+    """The slider-crank with equal links has a closed form; 2.8e-12 (of its length, or rad) is the measured
+    error."""
     scene = SCENES["planar_slider_crank_equal"]()
     times = np.array([0.03, SINGULAR - 5e-5, SINGULAR, SINGULAR + 5e-5, 0.08])
     run = ENGINE.run(scene, times, Setting("tuned", {"step": 1e-4}))
@@ -87,7 +91,8 @@ def test_exact_states_before_a_singular_position_are_extrapolated_to_and_beyond_
 
 
 def test_projection_of_rough_states_closes_the_joints():
-    """The five-bar at 4 ms with random errors of 1e-4, moved by at most ten times as much."""
+    """The exact state of the five-bar at 4 ms gets random errors of 1e-4 (ROUGH). Projected, its joints are
+    closed to rounding by the judge's equations, and it is at most ten times as far from the exact state."""
     scene, t = SCENES["five_bar"](), 0.004
     rng = np.random.default_rng(1)
     coordinates, rates = true_nodes(scene, np.array([t]))[1][:2, 0]
@@ -104,7 +109,9 @@ def test_projection_of_rough_states_closes_the_joints():
 
 
 def test_projection_moves_a_light_rod_and_not_a_heavy_flywheel():
-    """The rod is 1e-4 m off its joint with the flywheel."""
+    """The rod is 1e-4 m (ROUGH) off its joint with the flywheel. Weighted with the masses, the least motion
+    that closes the joint moves the rod, by at least a tenth of the gap, and the flywheel by less than a
+    thousandth."""
     scene = SCENES["planar_slider_crank_heavy"]()
     coordinates, rates = true_nodes(scene, np.array([0.5]))[1][:2, 0]
     rough = coordinates.copy()

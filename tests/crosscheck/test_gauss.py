@@ -14,7 +14,8 @@ from mbref.scenes import SCENES
 
 @pytest.mark.parametrize("name", ["point_pendulum", "bricard_thin"])
 def test_gausss_principle_accelerates_bodies_without_moments_of_inertia_as_the_reference(name):
-    """Their mass matrix is singular. Before, its Cholesky factorisation failed."""
+    """Their mass matrix is singular. Before, its Cholesky factorisation failed. The reference solves
+    equations of its own in long doubles; differences are rounding (1e-12 of the largest acceleration)."""
     scene = SCENES[name]()
     motion = natural_motion(scene, [0.0], EXTENDED, seconds=100.0)
     angular = scene_length(scene) * motion.angular_acceleration[0]
@@ -23,7 +24,8 @@ def test_gausss_principle_accelerates_bodies_without_moments_of_inertia_as_the_r
 
 
 def test_a_flat_rhombus_has_one_more_zero_singular_value_than_a_square_one():
-    """The least other singular value of the square one is above 1e-2."""
+    """A flat linkage can move on two branches, so that its rows have one rank less. Zeros are below 1e-12;
+    the least other singular value of the square one is above 1e-2."""
     straight, quarter = (singular_values(SCENES[n]()) for n in ("four_bar_straight", "four_bar_quarter"))
     zeros = [int(np.sum(values < 1e-12)) for values in (straight, quarter)]
     assert zeros[0] == zeros[1] + 1, (straight, quarter)

@@ -94,6 +94,8 @@ def test_result_of_verify_on_a_failing_engine_has_the_hint(monkeypatch):
 
 @pytest.mark.parametrize("name", [*NAMES, "force load", "turntable"])
 def test_terms_of_the_judge_give_the_accelerations_of_gausss_principle(name):
+    """Solved from mass matrix, forces and rows, in the state at a seventh of a second of the principle's
+    motion."""
     scene = KNOWN[name].scene
     motion = gauss_motion(scene, tuple(np.linspace(0.0, 0.2 * scene.duration, 5).tolist()))
     own = np.concatenate([motion.acceleration[3], motion.angular_acceleration[3]], axis=-1)

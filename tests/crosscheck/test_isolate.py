@@ -119,6 +119,7 @@ def test_an_observed_run_that_hangs_is_killed_with_the_processes_that_it_started
 def test_output_and_files_of_an_engine_do_not_reach_the_parent_process(
     capfd: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
+    """The engine CHATTER prints and writes a file into its working folder."""
     monkeypatch.chdir(tmp_path)
     ended = run("CHATTER")
     assert ended.outcome is Outcome.COMPLETED, ended.message
@@ -127,6 +128,7 @@ def test_output_and_files_of_an_engine_do_not_reach_the_parent_process(
 
 
 def test_a_child_computes_with_one_thread(monkeypatch: pytest.MonkeyPatch):
+    """The engine THREADS gives the numbers of threads of its process as its version."""
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
     ended = run("THREADS")
@@ -216,6 +218,8 @@ def test_first_questions_to_an_engine_wait_for_each_other(monkeypatch: pytest.Mo
 
 
 def test_engines_do_not_share_a_process(tmp_path: Path):
+    """RECORDER and SLOW log the process of their runs; the second run of RECORDER is in the first
+    process."""
     log, plain = tmp_path / "log", Setting("a")
     for fake in ("RECORDER", "SLOW", "RECORDER"):
         run_isolated(f"{FAKES}:{fake}", still(str(log)), TIMES, plain, 60.0)
@@ -223,6 +227,7 @@ def test_engines_do_not_share_a_process(tmp_path: Path):
 
 
 def test_no_child_outlives_a_parent_that_ends_or_is_killed(tmp_path: Path):
+    """Another Python process runs the engine RECORDER, which logs its process, and ends or kills itself."""
     log = tmp_path / "log"
     script = (
         "import os, sys; sys.path.insert(0, sys.argv[1])\n"
@@ -293,7 +298,8 @@ def test_a_signal_to_the_parent_ends_a_child_that_hangs_and_its_children(sent: s
     assert gone(int(pid.read_text())), f"the grandchild survived {sent}"
 
 
-def test_stop_all_ends_running_children(tmp_path: Path):
+def test_stop_all_kills_a_running_child_and_its_run_is_crashed(tmp_path: Path):
+    """The engine HANG writes the number of its process and sleeps."""
     pid = tmp_path / "pid"
     with ThreadPoolExecutor(1) as pool:
         future = pool.submit(run, "HANG", still(str(pid)))
@@ -306,8 +312,8 @@ def test_stop_all_ends_running_children(tmp_path: Path):
 
 
 def test_interleaved_runs_take_turns_in_one_process_after_one_untimed_round(tmp_path: Path):
-    """Job a takes 0.5 s; job b does not complete and has no time. The process that has imported the engine of
-    the first job serves this and the next timing."""
+    """Job a takes 0.5 s; job b does not complete and has no time. The process that has imported the engine
+    of the first job serves this and the next timing."""
     log = tmp_path / "log"
     _, served = ask(f"{FAKES}:RECORDER", converse, (), 60.0)
     jobs = [
@@ -342,6 +348,8 @@ def test_a_crash_among_interleaved_runs_is_raised_with_its_signal():
 
 
 def test_an_interrupt_ends_the_running_call_of_a_thread_and_cancels_the_waiting_one(tmp_path: Path):
+    """One thread has two calls of an engine that sleeps; KeyboardInterrupt comes while the first one
+    runs."""
     pid = tmp_path / "pid"
     with ThreadPoolExecutor(1) as pool:
         calls = [pool.submit(run, "HANG", still(str(pid))) for _ in range(2)]
