@@ -17,7 +17,7 @@ from mbref.equations.model import Model, Terms
 from mbref.equations.offsets import assembled
 from mbref.equations.packing import Packs
 from mbref.kernels.layout import Equations, Memory
-from mbref.kernels.memory_pool import SavedNumbers, arrays_in
+from mbref.kernels.memory_pool import SavedNumbers, arrays_in, bytes_of
 from mbref.kernels.scene_layout import SceneData
 from mbref.scene import Scene, SceneError
 from mbref.stepping.control import largest_violation
@@ -33,15 +33,26 @@ class Parameters:
     """
 
     def __init__(self, values: Sequence[tuple[Any, ...]], saved: SavedNumbers | None = None):
-        self._values = [(target, of_all, *(name or (...,))) for target, of_all, *name in values]
+        self._numbers = [(target, *of_all) for target, *of_all in values if len(of_all) > 1]
+        self._arrays = [
+            (bytes_of(target), *_rows(target, *of_all)) for target, *of_all in values if len(of_all) == 1
+        ]
         self._saved = saved
 
     def write(self, place: int) -> None:
         """Write the numbers of the scene with the given index."""
         if self._saved is not None:
             self._saved.restore()
-        for target, of_all, where in self._values:
-            target[where] = of_all[place]
+        for target, of_all, name in self._numbers:
+            target[name] = of_all[place]
+        for array, rows, size in self._arrays:
+            array[:] = rows[place * size : (place + 1) * size]
+
+
+def _rows(target: np.ndarray, of_all: np.ndarray) -> tuple[memoryview, int]:
+    """Return the bytes of the values (s, …) of an array, and the number of bytes of one scene."""
+    rows = np.ascontiguousarray(of_all, dtype=target.dtype).reshape(len(of_all), *target.shape)
+    return bytes_of(rows), target.nbytes
 
 
 def parameters_of(equations: Equations, data: SceneData, packs: Packs) -> list[tuple[Any, ...]]:

@@ -34,7 +34,7 @@ AHEAD = (
 )
 # most runs that a process receives at once, and the CPU time (s) that they may take: to prepare a batch takes
 # some 20 ms, and an executor of many machines needs milliseconds to pass on a call
-MOST_AT_ONCE, SECONDS = 256, 0.25
+MOST_AT_ONCE, SECONDS = 512, 0.25
 
 
 def ensemble(

@@ -33,16 +33,22 @@ class Rotors(NamedTuple):
     couplings: tuple[Coupled, ...] = ()
 
 
-def rotors_of(scene: Scene, frame: str, length: float) -> Rotors:
-    """Return the rotors of a scene of the given length (m), joined to the fixed frame with the given name;
-    none without masses."""
+def rotors_of(scene: Scene, frame: str) -> Rotors:
+    """Return the rotors of a scene, joined to the fixed frame with the given name; none without masses."""
     geared = [joint for joint in scene.joint if joint.reflected_inertia] if scene.has_mass() else []
     if not geared:
         return Rotors()
-    names = _free_names(scene, geared)
+    names, length = _free_names(scene, geared), _extent(scene)
     found = [_rotor(*pair, frame, length) for pair in zip(geared, names, strict=True)]
     bodies, joints, couplings = zip(*found, strict=True)
     return Rotors(bodies, joints, couplings)
+
+
+def _extent(scene: Scene) -> float:
+    """Return the largest side of a box around all centres of mass and anchors (m), or 1."""
+    points = [body.position for body in scene.body]
+    points += [anchor for joint in scene.joint for anchor in joint.anchor_pair]
+    return max(max(side) - min(side) for side in zip(*points, strict=True)) or 1.0
 
 
 def _free_names(scene: Scene, joints: list[Joint]) -> Iterator[str]:

@@ -169,8 +169,9 @@ def _corrected(scenes: Alike, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, di
     """Return consistent coordinates near q (s, 7 nb), the largest |Φ| (s,) before the correction, errors by
     index, and the terms at the new coordinates for zero velocities."""
     faults: dict[int, SceneError] = {}
-    q, before, terms = _solved(scenes, q, GROSS)
-    opened, left = gaps(before, scenes.length), gaps(terms, scenes.length)
+    found = _solved(scenes, q, GROSS)
+    q, before, terms, opened = found.coordinates, found.before, found.after, found.opened
+    left = opened if terms is before else gaps(terms, scenes.length)
     first, last = (gap.max(axis=1, initial=0.0) for gap in (opened, left))
     if not (last > CLOSED).any():
         return q, first, faults, terms
@@ -185,11 +186,11 @@ def _corrected(scenes: Alike, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, di
     return q, first, faults, terms
 
 
-def _are_met(scenes: Alike, places: np.ndarray, q: np.ndarray, terms: Terms) -> np.ndarray:
-    """Return for scenes with indices (k,), at coordinates q (k, 7 nb), whether their gaps are rounding."""
-    length = scenes.length[places]
-    reach = np.abs(q.reshape(len(q), scenes.model.nb, 7)[..., :3]).max(axis=(1, 2)) / length
-    return np.asarray(gaps(terms, length).max(axis=1, initial=0.0) <= MET * np.maximum(1.0, reach))
+def _are_met(scenes: Alike, places: np.ndarray, q: np.ndarray, gap: np.ndarray) -> np.ndarray:
+    """Return for scenes with indices (k,), at coordinates q (k, 7 nb), whether their gaps (k, m) are
+    rounding."""
+    reach = np.abs(q.reshape(len(q), scenes.model.nb, 7)[..., :3]).max(axis=(1, 2)) / scenes.length[places]
+    return np.asarray(gap.max(axis=1, initial=0.0) <= MET * np.maximum(1.0, reach))
 
 
 def solve_positions(model: Model, t: float, q: np.ndarray, value: Any = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -198,21 +199,30 @@ def solve_positions(model: Model, t: float, q: np.ndarray, value: Any = 0.0) -> 
     Newton–Raphson steps use the pseudo-inverse, so that redundant rows and a singular start are allowed; the
     change is least in the metric of M.
     """
-    found, _, terms = _solved(_alone(model, t, value), q[None], np.inf)
-    return found[0], terms.phi[0]
+    found = _solved(_alone(model, t, value), q[None], np.inf)
+    return found.coordinates[0], found.after.phi[0]
 
 
-def _solved(scenes: Alike, q: np.ndarray, most: float) -> tuple[np.ndarray, Terms, Terms]:
-    """Return ``solve_positions`` for each scene from q (s, 7 nb), unless the largest gap exceeds ``most``.
+class Solved(NamedTuple):
+    """Coordinates (s, 7 nb), the terms before and after the correction, at zero velocities, and the gaps
+    (s, m) before it."""
 
-    The results are the coordinates, and the terms before and after the correction, at zero velocities.
-    """
+    coordinates: np.ndarray
+    before: Terms
+    after: Terms
+    opened: np.ndarray
+
+
+def _solved(scenes: Alike, q: np.ndarray, most: float) -> Solved:
+    """Return ``solve_positions`` for each scene from q (s, 7 nb), unless the largest gap exceeds
+    ``most``."""
     q, every, at_rest = q.copy(), np.arange(len(q)), np.zeros((len(q), scenes.model.n))
     first = terms = scenes.terms(every, q, at_rest)
-    off = gaps(terms, scenes.length).max(axis=1, initial=0.0)
-    places, open_ = every, ~_are_met(scenes, every, q, terms) & (off <= most)
+    opened = gaps(terms, scenes.length)
+    places = every
+    open_ = ~_are_met(scenes, every, q, opened) & (opened.max(axis=1, initial=0.0) <= most)
     if not open_.any():
-        return q, first, first
+        return Solved(q, first, first, opened)
     for _ in range(MOST_ITERATIONS):
         places = places[open_]
         x = _least_changes(scenes, places, terms.blocks[open_], -terms.phi[open_])
@@ -221,10 +231,10 @@ def _solved(scenes: Alike, q: np.ndarray, most: float) -> tuple[np.ndarray, Term
         displace_all(moved, x[moves], np.zeros(q.shape[1]))
         q[places] = moved
         terms = scenes.terms(places, moved, at_rest[places])
-        open_ = ~_are_met(scenes, places, moved, terms)
+        open_ = ~_are_met(scenes, places, moved, gaps(terms, scenes.length[places]))
         if not open_.any():
             break
-    return q, first, scenes.terms(every, q, at_rest)
+    return Solved(q, first, scenes.terms(every, q, at_rest), opened)
 
 
 def _least_changes(scenes: Alike, places: np.ndarray, blocks: np.ndarray, rhs: np.ndarray) -> np.ndarray:

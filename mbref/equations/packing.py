@@ -274,7 +274,9 @@ def _once(function: Callable[[Any], Any], entries: Sequence[Any]) -> list[Any]:
 def _quaternions(axes: Sequence[np.ndarray | None]) -> np.ndarray:
     """Return quaternions (k, 4) of rotation matrices, where None means no rotation."""
     if all(each is None for each in axes):
-        return np.tile([1.0, 0.0, 0.0, 0.0], (len(axes), 1))
+        unturned = np.zeros((len(axes), 4))
+        unturned[:, 0] = 1.0
+        return unturned
     return rotations.from_matrix(np.array([np.eye(3) if each is None else each for each in axes]))
 
 

@@ -45,7 +45,7 @@ class Parts(NamedTuple):
 def all_parts(scene: Scene) -> Parts:
     """Return bodies and joints of a scene, with a rotor for each armature, and the ground as a body with six
     rows if the scene requests it."""
-    rotors = rotors_of(scene, FRAME, _extent(scene))
+    rotors = rotors_of(scene, FRAME)
     bodies, joints = (*scene.body, *rotors.bodies), (*scene.joint, *rotors.joints)
     if scene.ground == "frame":
         return Parts(bodies, joints, rotors.couplings)
@@ -53,10 +53,3 @@ def all_parts(scene: Scene) -> Parts:
     body = Body(name=GROUND, position=ORIGIN, mass=1.0 if inertia else None, inertia=inertia)
     hold = Fixed.model_construct(name=GROUND, bodies=(FRAME, GROUND), anchor=ORIGIN, type="fixed")
     return Parts((*bodies, body), (*joints, hold), rotors.couplings)
-
-
-def _extent(scene: Scene) -> float:
-    """Return the largest side of a box around all centres of mass and anchors (m), or 1."""
-    points = [body.position for body in scene.body]
-    points += [anchor for joint in scene.joint for anchor in joint.anchor_pair]
-    return max(max(side) - min(side) for side in zip(*points, strict=True)) or 1.0

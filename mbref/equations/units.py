@@ -29,7 +29,7 @@ def inverse_root(mass: np.ndarray) -> np.ndarray:
 
 def displacement_units(bodies: int, length: float) -> np.ndarray:
     """Return the units (6 nb,) in which displacements (δr, δπ') of bodies compare: a length (m), 1 rad."""
-    return np.tile(np.repeat([length, 1.0], 3), bodies)
+    return np.array(([length] * 3 + [1.0] * 3) * bodies)
 
 
 def row_lengths(matrix: np.ndarray) -> np.ndarray:

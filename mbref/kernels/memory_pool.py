@@ -8,7 +8,7 @@ the next run.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,16 +27,22 @@ class SavedNumbers:
     def __init__(self, values: Any):
         written = (array for array in arrays_in(values) if array.nbytes and array.flags.writeable)
         blocks = {id(block): block for block in map(block_of, written)}
-        self._pairs = [(block, block.copy()) for block in blocks.values()]
-        self.size = sum(block.nbytes for block, _ in self._pairs)  # bytes
+        self._pairs = [(view, bytes(view)) for view in map(bytes_of, blocks.values())]
+        self.size = sum(len(numbers) for _, numbers in self._pairs)  # bytes
 
     def restore(self) -> None:
         """Write the numbers back to the arrays and records from which they were copied."""
-        for block, numbers in self._pairs:
-            block[...] = numbers
+        for view, numbers in self._pairs:
+            view[:] = numbers
 
 
-def arrays_in(values: Any) -> list[np.ndarray]:
+def bytes_of(array: np.ndarray) -> memoryview:
+    """Return the bytes of a contiguous array, which take a third of the time to copy."""
+    buffer: Any = np.frombuffer(array, np.uint8)  # raises ValueError unless the array is contiguous
+    return memoryview(buffer)
+
+
+def arrays_in(values: tuple[Any, ...]) -> list[np.ndarray]:
     """Return the arrays of a schema and of the packed schemas in it. The array of a record has one
     element."""
     found: list[np.ndarray] = []
@@ -44,16 +50,16 @@ def arrays_in(values: Any) -> list[np.ndarray]:
     return found
 
 
-def _add_arrays(values: Any, found: list[np.ndarray]) -> None:
-    if isinstance(values, np.ndarray):
-        found.append(values)
-    elif isinstance(values, tuple):
-        for value in values:
+def _add_arrays(values: tuple[Any, ...], found: list[np.ndarray]) -> None:
+    for value in values:
+        if isinstance(value, np.ndarray):
+            found.append(value)
+        elif isinstance(value, tuple):
             _add_arrays(value, found)
-    elif isinstance(values, Packed):
-        _add_arrays(values.values, found)
-    elif isinstance(values, Numbers):
-        found.append(np.asarray(values.base))
+        elif isinstance(value, Packed):
+            _add_arrays((value.values,), found)
+        elif isinstance(value, Numbers):
+            found.append(np.asarray(value.base))
 
 
 class Pooled:
@@ -107,9 +113,9 @@ def release(memory: Pooled) -> None:
         kept.append(memory)
 
 
-def fill(target: Any, source: Any) -> None:
-    """Copy the arrays of one instance of a schema into another instance."""
-    for mine, theirs in zip(arrays_in(target), arrays_in(source), strict=True):
+def fill(target: tuple[Any, ...], arrays: Sequence[np.ndarray]) -> None:
+    """Copy arrays into the arrays of a schema, in their order."""
+    for mine, theirs in zip(arrays_in(target), arrays, strict=True):
         mine[...] = theirs
 
 
@@ -117,11 +123,6 @@ def write_record(record: Any, values: Any) -> None:
     """Write numbers to a record."""
     for name, value in zip(values._fields, values, strict=True):
         record[name] = value
-
-
-def shapes_of(values: Any) -> tuple[Any, ...]:
-    """Return the shapes of the arrays of a schema."""
-    return tuple(array.shape for array in arrays_in(values))
 
 
 def copied(values: Any) -> Any:

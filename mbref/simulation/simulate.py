@@ -197,6 +197,6 @@ def checked_times(times: Sequence[float] | np.ndarray) -> np.ndarray:
         raise InputError("times: must be numbers") from None
     if array.ndim != 1 or not array.size:
         raise InputError("times: needs at least one sample time")
-    if not np.isfinite(array).all() or array[0] < 0 or np.any(np.diff(array) <= 0):
+    if not np.isfinite(array).all() or array[0] < 0 or (array[1:] <= array[:-1]).any():
         raise InputError("times: must be finite, not negative and increasing")
     return array

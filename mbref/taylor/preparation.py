@@ -7,6 +7,8 @@ compiles ``driven.follow_drivers``, which takes long.
 
 from __future__ import annotations
 
+import functools
+
 from mbref.kernels.compilation import prepare_all
 from mbref.taylor.crossing.steps_across import (
     begin_crossing,
@@ -27,6 +29,7 @@ MIDDLE = len(CALLED) // 2
 KERNELS_OF_SERIES = *CALLED[:MIDDLE], *FROM_PYTHON, *CALLED[MIDDLE:]
 
 
+@functools.cache
 def prepare_series() -> None:
     """Compile the kernels of the series, or load them from the cache of this machine."""
     prepare_all(KERNELS_OF_SERIES)

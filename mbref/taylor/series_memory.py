@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from mbref.equations.branches import SMOOTH
-from mbref.kernels.memory_pool import Pooled, acquire, copied, fill, shapes_of
+from mbref.kernels.memory_pool import Pooled, acquire, arrays_in, copied, fill
 from mbref.kernels.named_memory import allocate
 from mbref.stepping.run import Run
 from mbref.taylor.correction import correct_state
@@ -48,10 +48,10 @@ def acquire_memory(run: Run, geometry: Geometry, polynomials: Polynomials, order
         **run.model.sizes,
     }  # fmt: skip
     # memory for one scene fits all scenes whose equations have equal shapes
-    shapes = shapes_of((polynomials, geometry.pose_maps, geometry.tableau))
-    key = (TaylorMemory, *sizes.values(), shapes, run.limits.branches)
+    numbers = arrays_in((polynomials, geometry.pose_maps, geometry.tableau))
+    key = (TaylorMemory, *sizes.values(), *(each.shape for each in numbers), run.limits.branches)
     memory = acquire(key, lambda: _allocate(run, geometry, polynomials, sizes), run.pooled)
-    put_equations(memory.values, geometry, polynomials)
+    _put(memory.values, numbers)
     return memory
 
 
@@ -80,5 +80,9 @@ def _allocate(
 
 def put_equations(memory: TaylorMemory, geometry: Geometry, polynomials: Polynomials) -> None:
     """Put the equations of a scene into memory."""
-    targets = memory.polynomials, memory.pose_maps, (memory.solver.linear, memory.solver.place)
-    fill(targets, (polynomials, geometry.pose_maps, geometry.tableau))
+    _put(memory, arrays_in((polynomials, geometry.pose_maps, geometry.tableau)))
+
+
+def _put(memory: TaylorMemory, equations: Sequence[np.ndarray]) -> None:
+    """Put the arrays of equations into memory."""
+    fill((memory.polynomials, memory.pose_maps, memory.solver.linear, memory.solver.place), equations)
