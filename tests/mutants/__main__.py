@@ -1,11 +1,11 @@
 """Plant drawn mutants one at a time in a copy of the sources, and see whether a test of the line fails.
 
-``python -m tests.mutants --seed 1 --count 50 --tests tests/doors`` draws so many places of the syntax trees
+``python -m tests.mutants --seed 1 --count 50`` draws so many places of the syntax trees
 of the packages, and prints a line for each, the numbers of killed mutants by folder, and the lines that
 survive. ``--only mbref/taylor crosscheck/judge`` draws from these paths alone; ``--list`` runs nothing.
-Tests run as plain Python. Once for each test file its lines are recorded in ``build/mutants``. Against a
-mutant run the test files that run its line, the quickest first, until a test fails or 60 CPU s are over
-(``--budget``).
+Tests run as plain Python. Once for each test its lines are recorded in ``build/mutants``. Against a mutant
+run the tests that run its line, until a test fails or 60 CPU s are over (``--budget``): first the quick tests
+that run few other lines.
 
 This is a tool to find cases that the tests lack: a mutant survives where no test shows the difference, or
 where the line makes none.
@@ -27,6 +27,7 @@ LIBRARIES += (
     *("scipy.sparse.linalg", "pydantic", "numba", "rich.progress"),
     *("jinja2", "matplotlib.figure", "mujoco"),
 )
+TESTS = ("tests/doors", "tests/mbref", "tests/crosscheck", "tests/properties", "tests/reports")
 BUDGET = 60.0  # CPU s of the tests of a mutant
 
 
@@ -41,7 +42,7 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=50, metavar="N", help="default: 50")
     parser.add_argument("--only", nargs="+", default=(), metavar="PATH", help="paths of sources begin so")
     parser.add_argument(
-        "--tests", nargs="+", default=["tests/doors"], metavar="PATH", help="files and folders"
+        "--tests", nargs="+", default=TESTS, metavar="PATH", help=f"default: {' '.join(TESTS)}"
     )
     parser.add_argument(
         "--budget", type=float, default=BUDGET, metavar="S", help="CPU s for a mutant's tests"
@@ -58,7 +59,8 @@ def main() -> int:
         return 0
     build = ROOT / "build" / "mutants"
     copy = Copy(ROOT, build / "copy", build / "lines", options.budget)
-    copy.record(files_of(options.tests))
+    for file in files_of(options.tests):
+        copy.record(file)
     results = {}
     for k, mutant in enumerate(chosen, 1):
         results[mutant], by = copy.result(mutant)

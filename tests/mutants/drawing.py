@@ -15,20 +15,9 @@ PACKAGES = ("mbref", "crosscheck", "reports")
 
 def drawn(root: Path, seed: int, count: int, only: Sequence[str] = ()) -> list[Mutant]:
     """Return ``count`` mutants, or all where there are fewer, of the files whose paths begin with one of
-    ``only``.
-
-    Half of them are drawn by file and then by place, the others by place alone, so that small files are seen,
-    too.
-    """
-    files = {name: mutants(name, (root / name).read_text()) for name in _files(root, only)}
-    files = {name: found for name, found in files.items() if found}
-    draw = random.Random(seed)
-    places = [mutant for found in files.values() for mutant in found]
-    chosen: dict[Mutant, None] = {}
-    while len(chosen) < min(count, len(places)):
-        pool = places if len(chosen) % 2 else files[draw.choice(list(files))]
-        chosen[draw.choice(pool)] = None
-    return list(chosen)
+    ``only``; each place is as probable as another."""
+    found = [mutant for name in _files(root, only) for mutant in mutants(name, (root / name).read_text())]
+    return random.Random(seed).sample(found, min(count, len(found)))
 
 
 def _files(root: Path, only: Sequence[str]) -> Iterator[str]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import ast
 import difflib
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -88,16 +89,42 @@ def mutants(file: str, source: str) -> list[Mutant]:
     return sorted(set(found), key=lambda m: (m.start, m.end, m.new))
 
 
-def statement(source: str, line: int) -> range:
-    """Return the lines of the innermost statement at a line, without the statements that it contains."""
-    found = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.stmt)]
-    around = [node for node in found if node.lineno <= line <= (node.end_lineno or 0)]
+def places(root: Path, packages: Sequence[str], mutant: Mutant) -> dict[str, int]:
+    """Return the lines (bits) of the sources whose tests can see a mutant: the innermost statement at its
+    line; for a function's head, its body; for a name's value outside functions, the lines with that name."""
+    source = (root / mutant.file).read_text()
+    tree = ast.parse(source)
+    around = [node for node in ast.walk(tree) if isinstance(node, ast.stmt) and _is_at(node, mutant.line)]
     innermost = max(around, key=lambda node: node.lineno)
-    inner = [
-        node.lineno for node in ast.walk(innermost) if isinstance(node, ast.stmt) and node is not innermost
+    if isinstance(innermost, ast.FunctionDef):
+        return {mutant.file: _bits(innermost.body[0].lineno, innermost.body[-1].end_lineno)}
+    if any(isinstance(node, ast.FunctionDef) for node in around):
+        inner = [node.lineno for node in ast.walk(innermost) if isinstance(node, ast.stmt)]
+        inner = [line for line in inner if line > mutant.line]
+        return {mutant.file: _bits(innermost.lineno, min(inner) - 1 if inner else innermost.end_lineno)}
+    names = [
+        node.id
+        for node in ast.walk(innermost)
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
     ]
-    end = max(innermost.lineno, min(inner) - 1) if inner else innermost.end_lineno or 0
-    return range(innermost.lineno, end + 1)
+    found = {}
+    for path in sorted(path for package in packages for path in (root / package).rglob("*.py")):
+        lines = path.read_text().splitlines()
+        named = re.compile(rf"\b({'|'.join(names) or '.'})\b")
+        at = [k for k, line in enumerate(lines, 1) if named.search(line)]
+        found[path.relative_to(root).as_posix()] = sum(1 << k for k in at)
+    if not names:
+        return {mutant.file: found[mutant.file]}
+    found[mutant.file] &= ~_bits(innermost.lineno, innermost.end_lineno)
+    return found
+
+
+def _is_at(node: ast.stmt, line: int) -> bool:
+    return node.lineno <= line <= (node.end_lineno or 0)
+
+
+def _bits(first: int, last: int | None) -> int:
+    return sum(1 << line for line in range(first, (last or first) + 1))
 
 
 def _nodes(node: ast.AST) -> Iterator[ast.AST]:

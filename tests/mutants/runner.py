@@ -9,6 +9,7 @@ from __future__ import annotations
 import compileall
 import contextlib
 import hashlib
+import itertools
 import json
 import os
 import resource
@@ -17,7 +18,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,22 +26,32 @@ import coverage
 import pytest
 
 from tests.mutants.drawing import PACKAGES
-from tests.mutants.operators import Mutant, statement
+from tests.mutants.operators import Mutant, places
 
 COPIED = (*PACKAGES, "tests", "examples", "benchmarks", "docs", "pyproject.toml", "README.md")
 OPTIONS = ("-q", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning")
 KILLED, SURVIVED, UNREACHED, OUT_OF_TIME = "killed", "survived", "not run by any test", "out of time"
-WAITING = 20.0  # wall time / CPU time, after which a test waits for something that does not come
-HANGS = 3.0  # CPU time / that without the mutant, beyond which a mutant has caused an endless loop
-NO_TESTS = pytest.ExitCode.NO_TESTS_COLLECTED
+LONGEST = 10.0  # CPU s of a test without mutants, beyond which it is left out
+WAITING = 5.0  # wall time / CPU time, after which a test waits for something that does not come
+SPARE, HANGS = 5.0, 10.0  # CPU s, and CPU time / that without the mutant; beyond both a mutant loops for ever
+BATCHES = (10, 40, 160)  # first tests of a mutant, by how many pytest runs before it collects the next ones
 
 
 class Recorded(NamedTuple):
-    """A test file without mutants: CPU s, tests that fail, and digests of sources with the lines that run."""
+    """A test without mutants: CPU s, whether it passes, and the lines that it runs (bits) of each source."""
 
+    name: str
     seconds: float
-    failed: list[str]
-    lines: dict[str, tuple[str, list[int]]]
+    passes: bool
+    lines: dict[str, str]
+
+    def cost(self) -> float:
+        """Return CPU s × lines: a test that runs few lines asks more of each of them."""
+        return self.seconds * sum(int(bits, 16).bit_count() for bits in self.lines.values())
+
+    def runs(self, wanted: dict[str, int]) -> bool:
+        """Return whether the test runs one of the wanted lines (bits) of the sources."""
+        return any(int(self.lines.get(file, "0"), 16) & bits for file, bits in wanted.items())
 
 
 class Copy:
@@ -55,44 +66,51 @@ class Copy:
             copy(root / name, place / name)
         for package in PACKAGES:
             compileall.compile_dir(place / package, quiet=2)
-        self._reached: dict[str, Recorded] = {}
+        self._tests: list[Recorded] = []
         self._planted = 0
 
-    def record(self, files: Iterable[str]) -> None:
-        """Record the lines that each test file runs; a recording is kept until the file changes."""
+    def record(self, file: str) -> None:
+        """Record the lines that each test of a file runs; a recording is kept until the file changes."""
         self.kept.mkdir(parents=True, exist_ok=True)
-        for file in files:
-            path = self.kept / f"{digest(file + (self.place / file).read_text())}.json"
-            if not path.exists():
-                answer = _forked(self.place, lambda out, file=file: _record(file, out), 20 * self.limit)
-                path.write_text(json.dumps(answer or {"seconds": 0.0, "failed": [file], "lines": {}}))
-            self._reached[file] = found = Recorded(**json.loads(path.read_text()))
-            for test in found.failed:
-                print(f"left out, since it fails without a mutant: {test}", flush=True)
+        path = self.kept / f"{digest(file + (self.place / file).read_text())}.jsonl"
+        found, part = read(path), path.with_suffix(".part")
+        while not path.exists():
+            left = [test.name for test in read(part)]
+            _, answer = _forked(
+                self.place, lambda out, left=left: _record(file, left, part, out), 20 * self.limit
+            )
+            if answer or len(read(part)) == len(left):  # at the end, or no test was begun
+                part.touch()
+                part.rename(path)
+            found = read(path)
+        for test in found:
+            if not test.passes:
+                print(f"left out, since it fails or takes {LONGEST:g} CPU s: {test.name}", flush=True)
+        self._tests += [test for test in found if test.passes]
 
-    def tests(self, mutant: Mutant) -> list[str]:
-        """Return the sound test files that run the line of a mutant, the quickest first."""
-        source, found = (self.place / mutant.file).read_text(), []
-        now, wanted = digest(source), {*statement(source, mutant.line)}
-        for file, recorded in self._reached.items():
-            then, lines = recorded.lines.get(mutant.file, ("", []))
-            if file not in recorded.failed and then and (then != now or wanted & {*lines}):
-                found.append(file)
-        return sorted(found, key=lambda file: self._reached[file].seconds)
+    def tests(self, mutant: Mutant) -> list[Recorded]:
+        """Return the tests that run the line of a mutant, the cheapest and closest first.
+
+        Other tests of their files come last: a line may run in the first test of a file alone, which keeps
+        its result for the others.
+        """
+        wanted = places(self.place, PACKAGES, mutant)
+        ordered = sorted(self._tests, key=Recorded.cost)
+        first = [test for test in ordered if test.runs(wanted)]
+        files, names = {_file(test.name) for test in first}, {test.name for test in first}
+        return first + [test for test in ordered if _file(test.name) in files and test.name not in names]
 
     def result(self, mutant: Mutant) -> tuple[str, str]:
         """Return KILLED, SURVIVED, UNREACHED or OUT_OF_TIME, and the test that sees the mutant."""
-        files = self.tests(mutant)
-        if not files:
+        tests = self.tests(mutant)
+        if not tests:
             return UNREACHED, ""
-        out_of_it = [test for file in files for test in self._reached[file].failed]
         with self._plant(mutant):
-            answer = _forked(self.place, lambda out: _run(files, out_of_it, out), self.limit)
+            used, answer = _forked(self.place, lambda out: _run(tests, self.limit, out), self.limit)
         if answer is None:
-            usual = sum(self._reached[file].seconds for file in files)
-            return (KILLED, "an endless loop") if HANGS * usual < self.limit else (OUT_OF_TIME, "")
+            return (KILLED, "an endless loop") if used < self.limit else (OUT_OF_TIME, "")
         failed = answer.get("failed", ["the process ended"])
-        return (KILLED, failed[0]) if failed else (SURVIVED, "")
+        return (KILLED, failed[0]) if failed else (answer["result"], "")
 
     @contextlib.contextmanager
     def _plant(self, mutant: Mutant) -> Iterator[None]:
@@ -114,9 +132,19 @@ def digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def _forked(place: Path, work: Callable[[Path], None], limit: float) -> dict[str, Any] | None:
-    """Return the answer that a fork writes in a copy of the sources; nothing where it crashes, None where it
-    exceeds its CPU s."""
+def read(path: Path) -> list[Recorded]:
+    """Return the recorded tests of a file with a line for each, none where there is no file."""
+    lines = path.read_text().splitlines() if path.exists() else []
+    return list({test.name: test for test in (Recorded(*json.loads(line)) for line in lines)}.values())
+
+
+def _file(test: str) -> str:
+    return test.partition("::")[0]
+
+
+def _forked(place: Path, work: Callable[[Path], None], limit: float) -> tuple[float, dict[str, Any] | None]:
+    """Return the CPU s of a fork in a copy of the sources, and the answer that it writes: nothing where it
+    crashes, None where it exceeds its CPU s."""
     with tempfile.TemporaryDirectory() as folder:
         out, end = Path(folder) / "answer", time.monotonic() + WAITING * limit
         sys.stdout.flush()
@@ -128,10 +156,10 @@ def _forked(place: Path, work: Callable[[Path], None], limit: float) -> dict[str
                 work(out)
             finally:
                 os._exit(0)
-        status = _wait(child, end)
+        status, seconds = _wait(child, end)
         if os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL):
-            return None
-        return json.loads(out.read_text()) if out.exists() else {}
+            return seconds, None
+        return seconds, json.loads(out.read_text()) if out.exists() else {}
 
 
 def _enter(place: Path, folder: Path, limit: float) -> None:
@@ -147,25 +175,48 @@ def _enter(place: Path, folder: Path, limit: float) -> None:
     os.environ |= {"PYTHONPATH": str(place), "XDG_CACHE_HOME": str(folder), "HYPOTHESIS_PROFILE": "first"}
 
 
-def _wait(child: int, end: float) -> int:
-    """Return the status with which a fork ends; it is killed at the end, and its children in any case."""
-    ended, status = 0, 0
+def _wait(child: int, end: float) -> tuple[int, float]:
+    """Return the status with which a fork ends, and its CPU s; it is killed at the end, and its children in
+    any case."""
+    ended = 0
     while not ended:
-        ended, status = os.waitpid(child, os.WNOHANG)
+        ended, status, used = os.wait4(child, os.WNOHANG)
         if not ended and time.monotonic() > end:
             os.killpg(child, signal.SIGKILL)
-            ended, status = os.waitpid(child, 0)
+            ended, status, used = os.wait4(child, 0)
         time.sleep(0.02)
     with contextlib.suppress(ProcessLookupError):
         os.killpg(child, signal.SIGKILL)
-    return status
+    return status, used.ru_utime + used.ru_stime
+
+
+def _seconds() -> float:
+    """Return the CPU s of this process and its children that have ended."""
+    return sum(os.times()[:4])
+
+
+def _limit(seconds: float) -> None:
+    """Let this process end after some CPU s from now, and not later than it would."""
+    hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
+    resource.setrlimit(resource.RLIMIT_CPU, (min(int(time.process_time() + seconds) + 1, hard - 2), hard))
 
 
 class _Failures:
-    """A pytest plugin that notes the tests that fail, or the files that cannot be collected."""
+    """A pytest plugin that notes the tests that fail, or the files that cannot be collected; it runs tests in
+    an order, and stops when a time has come."""
 
-    def __init__(self) -> None:
+    def __init__(self, usual: dict[str, float], end: float) -> None:
         self.names: list[str] = []
+        self.usual, self.end = usual, end
+
+    @pytest.hookimpl(wrapper=True, tryfirst=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
+        """Limit the CPU s of a test."""
+        if _seconds() > self.end:
+            item.session.shouldstop = "out of time"
+            return True
+        _limit(SPARE + HANGS * self.usual.get(item.nodeid, 0.0))
+        return (yield)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Note a test."""
@@ -176,30 +227,56 @@ class _Failures:
         self.names += [report.nodeid] if report.failed else []
 
 
-def _pytest(files: list[str], *arguments: str) -> list[str]:
-    """Run pytest, and return the tests that fail, or the first file where pytest itself does."""
-    failures = _Failures()
-    status = pytest.main([*OPTIONS, *files, *arguments], plugins=[failures])
-    return failures.names or ([] if status in (pytest.ExitCode.OK, NO_TESTS) else files[:1])
-
-
-def _run(files: list[str], without: list[str], out: Path) -> None:
-    """Write the first failure of test files without some tests."""
+def _run(tests: list[Recorded], limit: float, out: Path) -> None:
+    """Write the first failure of tests, which pytest collects in batches."""
     sys.dont_write_bytecode = True
-    out.write_text(json.dumps({"failed": _pytest(files, "-x", *(f"--deselect={test}" for test in without))}))
+    plugin = _Failures({test.name: test.seconds for test in tests}, limit)
+    ends = [0, *(end for end in BATCHES if end < len(tests)), len(tests)]
+    for first, last in itertools.pairwise(ends):
+        pytest.main([*OPTIONS, "-x", *(test.name for test in tests[first:last])], plugins=[plugin])
+        if plugin.names or _seconds() > limit:
+            break
+    result = OUT_OF_TIME if _seconds() > limit else SURVIVED
+    out.write_text(json.dumps({"failed": plugin.names, "result": result}))
 
 
-def _record(file: str, out: Path) -> None:
-    """Write the CPU s, the failures and the lines of the packages of a test file."""
-    place, before = Path.cwd(), time.process_time()
-    lines = coverage.Coverage(
-        data_file=None, config_file=False, source=[str(place / name) for name in PACKAGES], messages=False
-    )
-    lines.start()
-    failed = _pytest([file])
-    lines.stop()
-    data, found = lines.get_data(), {}
-    for path in map(Path, data.measured_files()):
-        if run := data.lines(str(path)):
-            found[path.relative_to(place).as_posix()] = digest(path.read_text()), sorted(run)
-    out.write_text(json.dumps({"seconds": time.process_time() - before, "failed": failed, "lines": found}))
+class _Recorder:
+    """A pytest plugin that writes a line for each test."""
+
+    def __init__(self, place: Path, part: Path) -> None:
+        folders = [str(place / name) for name in PACKAGES]
+        self.place, self.part, self.passes = place, part, True
+        self.lines = coverage.Coverage(data_file=None, config_file=False, source=folders, messages=False)
+        self.lines.set_option("run:disable_warnings", ["no-data-collected", "module-not-imported"])
+
+    @pytest.hookimpl(wrapper=True, tryfirst=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
+        """Write a test that fails before it begins, and again when it has ended."""
+        self._write(item.nodeid, 0.0, False, {})
+        _limit(LONGEST)
+        self.lines.erase()
+        self.passes, before = True, _seconds()
+        self.lines.start()
+        done = yield
+        self.lines.stop()
+        data, found = self.lines.get_data(), {}
+        for path in map(Path, data.measured_files()):
+            bits = sum(1 << line for line in data.lines(str(path)) or ())
+            found[path.relative_to(self.place).as_posix()] = f"{bits:x}"
+        self._write(item.nodeid, round(_seconds() - before, 4), self.passes, found)
+        return done
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Note whether a test passes."""
+        self.passes &= not report.failed
+
+    def _write(self, *recorded: Any) -> None:
+        with self.part.open("a") as file:
+            file.write(json.dumps(recorded) + "\n")
+
+
+def _record(file: str, left: list[str], part: Path, out: Path) -> None:
+    """Write the lines of the tests of a file, except some."""
+    deselected = (f"--deselect={test}" for test in left)
+    pytest.main([*OPTIONS, file, *deselected], plugins=[_Recorder(Path.cwd(), part)])
+    out.write_text(json.dumps({"ended": True}))
