@@ -33,7 +33,11 @@ OPTIONS = ("-q", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRew
 KILLED, SURVIVED, UNREACHED, OUT_OF_TIME = "killed", "survived", "not run by any test", "out of time"
 LONGEST = 10.0  # CPU s of a test without mutants, beyond which it is left out
 WAITING = 5.0  # wall time / CPU time, after which a test waits for something that does not come
-SPARE, HANGS = 5.0, 10.0  # CPU s, and CPU time / that without the mutant; beyond both a mutant loops for ever
+SPARE, HANGS = (
+    20.0,
+    10.0,
+)  # CPU s, and CPU time / that without the mutant; beyond both a mutant loops for ever
+ENDS = (pytest.ExitCode.OK, pytest.ExitCode.INTERRUPTED, pytest.ExitCode.NO_TESTS_COLLECTED)
 BATCHES = (10, 40, 160)  # first tests of a mutant, by how many pytest runs before it collects the next ones
 
 
@@ -202,12 +206,18 @@ def _limit(seconds: float) -> None:
 
 
 class _Failures:
-    """A pytest plugin that notes the tests that fail, or the files that cannot be collected; it runs tests in
-    an order, and stops when a time has come."""
+    """A pytest plugin that notes the tests that fail, or the files that cannot be collected; it runs the
+    given tests alone, in their order, and stops at the CPU time ``end`` (s)."""
 
-    def __init__(self, usual: dict[str, float], end: float) -> None:
+    def __init__(self, tests: list[Recorded], end: float) -> None:
         self.names: list[str] = []
-        self.usual, self.end = usual, end
+        self.usual, self.end = {test.name: test.seconds for test in tests}, end
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        """Choose and order the tests; some names of cases cannot be arguments of pytest."""
+        places = {name: k for k, name in enumerate(self.usual)}
+        items[:] = sorted((i for i in items if i.nodeid in places), key=lambda i: places[i.nodeid])
 
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
@@ -215,7 +225,7 @@ class _Failures:
         if _seconds() > self.end:
             item.session.shouldstop = "out of time"
             return True
-        _limit(SPARE + HANGS * self.usual.get(item.nodeid, 0.0))
+        _limit(SPARE + HANGS * self.usual[item.nodeid])
         return (yield)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
@@ -230,14 +240,16 @@ class _Failures:
 def _run(tests: list[Recorded], limit: float, out: Path) -> None:
     """Write the first failure of tests, which pytest collects in batches."""
     sys.dont_write_bytecode = True
-    plugin = _Failures({test.name: test.seconds for test in tests}, limit)
+    failed: list[str] = []
     ends = [0, *(end for end in BATCHES if end < len(tests)), len(tests)]
-    for first, last in itertools.pairwise(ends):
-        pytest.main([*OPTIONS, "-x", *(test.name for test in tests[first:last])], plugins=[plugin])
-        if plugin.names or _seconds() > limit:
+    for batch in (tests[first:last] for first, last in itertools.pairwise(ends)):
+        plugin, files = _Failures(batch, limit), dict.fromkeys(_file(test.name) for test in batch)
+        status = pytest.main([*OPTIONS, "-x", *files], plugins=[plugin])
+        failed = plugin.names or ([] if status in ENDS else [*files][:1])
+        if failed or _seconds() > limit:
             break
     result = OUT_OF_TIME if _seconds() > limit else SURVIVED
-    out.write_text(json.dumps({"failed": plugin.names, "result": result}))
+    out.write_text(json.dumps({"failed": failed, "result": result}))
 
 
 class _Recorder:
