@@ -39,7 +39,7 @@ kills: $(VENV)/ready ## processes of studies and ensembles killed at random mome
 
 SEED := 1
 
-mutants: $(VENV)/ready ## plant 50 random defects (make mutants SEED=2) and print which the tests in tests/doors see
+mutants: $(VENV)/ready ## plant 50 random defects (make mutants SEED=2) and print which the tests see
 	$(BIN)/python -m tests.mutants --seed $(SEED) --count 50
 
 machines: $(VENV)/ready ## the tests as on other processors: OpenBLAS' and numba's code for them, and motions compared

@@ -93,18 +93,6 @@ def test_kinetic_energy_and_energy_of_springs_are_the_judge_s(name, request):
     assert np.allclose(of_springs, judged, rtol=1e-12)
 
 
-def test_energy_of_a_motion_on_undamped_springs_is_constant(door):
-    """The sum of kinetic energy and energies of a spring and a torsion spring, to 100 rtol of what they
-    exchange."""
-    assert np.ptp(door.energy) < 100 * 1e-11 * np.ptp(door.kinetic_energy)
-
-
-def test_energy_of_a_motion_under_gravity_is_constant():
-    """To 100 rtol of the kinetic energy that the rhombus gains."""
-    motion = simulate("four_bar_gravity", times=TIMES, limits=Limits(rtol=1e-11))
-    assert np.ptp(motion.energy) < 100 * 1e-11 * np.ptp(motion.kinetic_energy)
-
-
 def test_energy_of_a_tumbling_body_is_that_of_its_principal_axes():
     """½ (A p² + B q² + C r²) with the rates about its own axes: 9.7 J, constant without moments while the
     angular velocity changes by more than 1 rad/s."""

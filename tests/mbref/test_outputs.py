@@ -79,66 +79,6 @@ def test_torque_of_a_driver_is_the_moment_that_the_pendulum_needs(bodies, z, sen
     assert np.allclose(found.power, torque * rate, atol=ACCURACY)
 
 
-def test_force_of_a_driver_pushes_a_slide_up_its_tilted_guide():
-    """F = m (s'' + g sin 30°) with s = 0.3 t + 0.1 t², and power F s'."""
-    axis = (np.sqrt(3) / 2, 0.5, 0.0)
-    slide = {"name": "slide", "mass": MASS, "inertia": [INERTIA] * 3, "position": [0.0, 0.0, 0.0]}
-    guide = {
-        "name": "D",
-        "type": "translational",
-        "bodies": ["ground", "slide"],
-        "anchor": [0.0, 0.0, 0.0],
-        "axis": axis,
-    }
-    scene = Scene(
-        name="lift",
-        gravity=(0.0, -G, 0.0),
-        body=[slide],
-        joint=[guide],
-        driver=[{"joint": "D", "polynomial": [0.0, 0.3, 0.1]}],
-    )
-    motion = simulate(scene, times=TIMES)
-    found, speed = motion.driver("D"), 0.3 + 0.2 * TIMES
-    assert np.allclose(found.force, MASS * (0.2 + G / 2), atol=ACCURACY) and found.torque is None
-    assert np.allclose(motion.joint("D").displacement_rate, speed, atol=ACCURACY)
-    assert np.allclose(found.power, MASS * (0.2 + G / 2) * speed, atol=ACCURACY)
-
-
-def test_rate_of_a_displacement_is_taken_along_the_turning_guide():
-    """A slide on a turning arm, thrown out by more than 0.1 m: the rate is the difference quotient of the
-    displacement along the arm. Its error is h² s''' / 3, about 1e-5 m/s with steps h of 1 ms."""
-    arm = {
-        "name": "arm",
-        "mass": 1.0,
-        "inertia": [0.1] * 3,
-        "position": [0.5, 0.0, 0.0],
-        "angular_velocity": [0.0, 0.0, 2.0],
-    }
-    slide = {"name": "slide", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.8, 0.1, 0.0]}
-    joints = [
-        {
-            "name": "A",
-            "type": "revolute",
-            "bodies": ["ground", "arm"],
-            "anchor": [0.0] * 3,
-            "axis": [0.0, 0.0, 1.0],
-        },
-        {
-            "name": "D",
-            "type": "translational",
-            "bodies": ["arm", "slide"],
-            "anchor": [0.8, 0.1, 0.0],
-            "axis": [1.0, 0.0, 0.0],
-        },
-    ]
-    motion = simulate(Scene(name="arm", body=[arm, slide], joint=joints), times=np.linspace(0.0, 0.5, 501))
-    joint = motion.joint("D")
-    assert np.allclose(
-        joint.displacement_rate, np.gradient(joint.displacement, motion.times, edge_order=2), atol=1e-4
-    )
-    assert joint.displacement[-1] > 0.1
-
-
 def test_length_rate_and_force_of_a_spring_follow_from_geometry(sprung):
     """The law of cosines between the post and the tip of the rod."""
     theta, turning, _ = angle(TIMES)

@@ -43,18 +43,6 @@ def difference(measured, expected):
     return np.max(np.abs(np.asarray(measured) - expected))
 
 
-def test_angle_of_a_torsion_spring_is_counted_over_six_turns():
-    """φ = φ₀ (1 - cos ωt) with φ₀ = 20 rad and ω² = 0.4 N m/rad / 0.1 kg m²: up to 39.8 rad."""
-    spring = TorsionSpring(joint="H", stiffness=0.4, natural_angle=20.0)
-    times = np.linspace(0, 1.5, 16)
-    trajectory = completed(one_body((AXLE,), (spring,)), times=times)
-    angle = 20 * (1 - np.cos(2 * times))
-    expected = np.stack([np.cos(angle / 2), np.sin(angle / 2)], axis=1)
-    measured = trajectory.orientation[:, 0, :2]
-    sign = np.sign(np.sum(measured * expected, axis=1))[:, None]
-    assert difference(sign * measured, expected) < 100 * FINE.rtol
-
-
 def spinning(load=()):
     """Return a body that turns about its hinge at 10 rad/s."""
     return one_body((AXLE,), load, angular_velocity=(10.0, 0.0, 0.0))

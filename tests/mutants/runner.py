@@ -112,7 +112,7 @@ class Copy:
         with self._plant(mutant):
             used, answer = _forked(self.place, lambda out: _run(tests, self.limit, out), self.limit)
         if answer is None:
-            return (KILLED, "an endless loop") if used < self.limit else (OUT_OF_TIME, "")
+            return (KILLED, "an endless loop") if used < self.limit - 1 else (OUT_OF_TIME, "")
         failed = answer.get("failed", ["the process ended"])
         return (KILLED, failed[0]) if failed else (answer["result"], "")
 
@@ -221,12 +221,12 @@ class _Failures:
 
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
-        """Limit the CPU s of a test."""
+        """Limit the CPU s of a test; none follows when the time has come."""
+        _limit(SPARE + HANGS * self.usual[item.nodeid])
+        done = yield
         if _seconds() > self.end:
             item.session.shouldstop = "out of time"
-            return True
-        _limit(SPARE + HANGS * self.usual[item.nodeid])
-        return (yield)
+        return done
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Note a test."""

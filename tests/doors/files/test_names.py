@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 from xml.etree import ElementTree
 
@@ -10,6 +11,7 @@ import pytest
 from markdown_it import MarkdownIt
 
 import mbref
+from crosscheck.cli import main as crosscheck
 from crosscheck.study.command import command
 from mbref.cli import main
 from mbref.files import file_name
@@ -18,9 +20,11 @@ from reports import sections
 from reports.blocks import Card, Figure, Heading, Listing, Record, Table, Text
 from reports.render import html, markdown
 from reports.runs import Run, SceneRuns
+from tests.helpers.falling_engine import STONE
 from tests.helpers.parts import hinge
 from tests.reports import synthetic
 
+FALLING = "tests.helpers.falling_engine:ENGINE"
 NAMES = [
     "../../other",
     "/etc/passwd",
@@ -124,6 +128,22 @@ def test_printed_commands_of_a_report_name_the_scene_file_as_one_word(name):
         assert f"scenes/{file_name(name)}.toml" in shlex.split(line), line
     path = f"a folder/{name}.toml"
     assert path in shlex.split(command(group.runs[0].record, shlex.quote(path)))
+
+
+def test_printed_commands_name_a_scene_file_in_any_folder_as_one_word(tmp_path, capsys):
+    """The next step after `mbref new`, and the runs that `crosscheck tune` and `crosscheck compare` print."""
+    path = tmp_path / "my scenes" / "it's.toml"
+    path.parent.mkdir()
+    assert main(["new", str(path)]) == 0
+    printed = [capsys.readouterr().out.rpartition("next, ")[2]]
+    STONE.save(path)
+    assert crosscheck(["tune", FALLING, str(path), "--json"]) == 0
+    printed += [record["command"] for record in json.loads(capsys.readouterr().out)["records"]]
+    assert crosscheck(["compare", str(path), "--engine", FALLING]) == 0
+    printed += re.findall("crosscheck run .*", capsys.readouterr().out)
+    assert len(printed) == 3
+    for line in printed:
+        assert str(path) in shlex.split(line), line
 
 
 @pytest.mark.parametrize("name", [*NAMES, "back\\slash", "\\u0041"])

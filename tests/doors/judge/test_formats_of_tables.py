@@ -137,3 +137,14 @@ def test_times_that_are_rounded_are_compared_within_their_rounding(form: str, tm
     assert crosscheck.judge_motion(scene, write_table(part, path, FORMATS[form])).is_right
     part["A.angle"] = part["A.angle"] + 0.05 * (np.arange(26) == 20)
     assert not crosscheck.judge_motion(scene, write_table(part, path, FORMATS[form])).is_right
+
+
+def test_zero_among_numbers_with_an_exponent_is_exact(tmp_path: Path) -> None:
+    """The angle 0.000e+00 is not rounded to three decimals: zero in place of a small angle is off."""
+    scene, path = double_pendulum(), tmp_path / "run.csv"
+    table = crosscheck.reference_table(scene, np.array([0.0, 0.005, 0.1, 0.2]))
+    part = {n: table[n].copy() for n in ("time", "A.angle")}
+    assert 1e-6 < abs(part["A.angle"][1]) < 4e-4
+    assert crosscheck.judge_motion(scene, write_table(part, path, FORMATS["%.3e"])).is_right
+    part["A.angle"][1] = 0.0
+    assert not crosscheck.judge_motion(scene, write_table(part, path, FORMATS["%.3e"])).is_right
