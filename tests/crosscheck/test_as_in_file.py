@@ -165,17 +165,7 @@ def sentence(scene, **changes) -> str:
         scene.name, "mujoco", "3", AS_IN_FILE, settings, np.array([0.0]), tuple(b.name for b in scene.body),
         places[None], turns[None], still, still,
     )  # fmt: skip
-    record = {
-        **run.to_record(),
-        "scene": scene.name,
-        "engine": "mujoco",
-        "family": AS_IN_FILE,
-        "outcome": "COMPLETED",
-        "settings": settings,
-        "metrics": metrics,
-        "t_end": 1.0,
-        "message": "",
-    }
+    record = run.to_record() | {"scene": scene.name, "family": AS_IN_FILE, "metrics": metrics, "t_end": 1.0}
     return as_in_file([Judged(scene, {}, [record | changes])])
 
 

@@ -233,6 +233,7 @@ def test_an_unknown_method_is_refused_with_the_known_ones(capsys, still):
 
 @pytest.mark.parametrize("what", ["scenes", "engines", "methods", "settings", "metrics"])
 def test_list_names_every_scene_engine_method_setting_and_metric(capsys, what):
+    """Of settings, a family of MuJoCo, Pinocchio and Exudyn each."""
     from crosscheck.engine import engine_names
     from crosscheck.judge.metrics import METRICS
     from mbref.formulations import FORMULATIONS
@@ -280,6 +281,7 @@ def test_certify_refuses_an_output_file_in_a_missing_folder(capsys, tmp_path):
 
 
 def test_certify_writes_its_table_and_prints_the_progress_of_both_formulations(capsys, tmp_path):
+    """Their last progress is 100 of 100 hundredths of the motion, which ends at 0.002 s."""
     pytest.importorskip("flint", reason="python-flint is the extra `certify`")
     status, _, err = run_main(capsys, *CERTIFY, str(tmp_path / "table.json"))
     assert status == 0 and (tmp_path / "table.json").exists(), err
@@ -347,34 +349,21 @@ def test_tune_has_exit_status_one_if_no_setting_reaches_the_error(capsys, still)
 
 
 @pytest.mark.parametrize(
-    ("more", "says"),
+    ("error", "bound", "outcome", "says"),
     [
-        (
-            {"metrics": {"error": 1e-7, "error_bound": 1e-12}},
-            "No setting reaches an error of 1e-08; the nearest",
-        ),
-        (
-            {"metrics": {"error": 1e-9, "error_bound": 1e-7}},
-            "The truth is known to 1e-07, so no run can be seen",
-        ),
-        ({"metrics": {"error": None}}, "No error is known, because no truth of this motion is known"),
-        ({"metrics": {"error": 1e-9}, "outcome": "NOT_FINITE"}, "no run completes"),
+        (1e-7, 1e-12, "COMPLETED", "No setting reaches an error of 1e-08; the nearest"),
+        (1e-9, 1e-7, "COMPLETED", "The truth is known to 1e-07, so no run can be seen"),
+        (None, None, "COMPLETED", "No error is known, because no truth of this motion is known"),
+        (1e-9, 1e-12, "NOT_FINITE", "no run completes"),
     ],
     ids=["error too large", "truth too rough", "no truth", "no completed run"],
 )
-def test_tune_says_why_no_run_reaches_the_error(more, says):
-    """The error asked for is 1e-8; each case has one run."""
-    asked = {"options": {"s": 1.0}}
-    run = {
-        "engine": "e",
-        "family": "f",
-        "outcome": "COMPLETED",
-        "t_end": 1.0,
-        "asked": asked,
-        "cost": {"seconds": 1},
-    }
+def test_tune_says_why_no_run_reaches_the_error(error, bound, outcome, says):
+    """The error asked for is 1e-8; there is one run, and ``bound`` is the error of the truth."""
+    run = {"engine": "e", "family": "f", "outcome": outcome, "t_end": 1.0, "cost": {"seconds": 1}}
+    run |= {"asked": {"options": {"s": 1.0}}, "metrics": {"error": error, "error_bound": bound}}
     shown = Console(width=200, file=io.StringIO())
-    tables.print_tuning(shown, by_error(1e-8), [], [{**run, **more}], SCENES["four_bar"](), "my.toml")
+    tables.print_tuning(shown, by_error(1e-8), [], [run], SCENES["four_bar"](), "my.toml")
     assert says in shown.file.getvalue(), shown.file.getvalue()
 
 

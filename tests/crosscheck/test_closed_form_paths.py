@@ -16,23 +16,10 @@ from crosscheck.judge.truth.one_dof import one_dof
 from crosscheck.judge.truth.parallelogram import parallelogram
 from crosscheck.judge.truth.spatial_slider_crank import spatial_slider_crank
 from mbref import rotations
-from mbref.scene import (
-    Body,
-    Coupling,
-    Cylindrical,
-    Driver,
-    Factor,
-    JointForce,
-    JointTorque,
-    Moment,
-    Revolute,
-    Scene,
-    Spherical,
-    Translational,
-    Universal,
-)
+from mbref.scene import Body, Cylindrical, Driver, JointForce, JointTorque, Moment, Revolute, Scene
+from tests.helpers.parts import X, Z, joint
 
-X, Y, Z, O = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+O = (0.0, 0.0, 0.0)
 
 
 def body(name: str, *place: float, **parts: Any) -> Body:
@@ -67,12 +54,12 @@ BOX = scene(
 @pytest.mark.parametrize(
     "parts",
     [
-        {"load": (Moment(body="bar", moment=Z, factor=Factor(start=0.5)),)},
+        {"load": (Moment(body="bar", moment=Z, factor={"start": 0.5}),)},
         {"load": (JointTorque(joint="A", torque=1.0),)},
         {"load": (Moment(body="bar", moment=Z), JointForce(joint="B", force=1.0))},
         {"driver": (Driver(joint="A", table=((0.0, 0.0), (1.0, 1.0), (2.0, 0.0), (3.0, 1.0))),)},
         {"joint": (PENDULUM.joint[0].model_copy(update={"armature": 0.5}),)},
-        {"coupling": (Coupling(name="G", joints=("B", "B"), ratio=1.0),)},
+        {"coupling": ({"name": "G", "joints": ("B", "B"), "ratio": 1.0},)},
     ],
     ids=["switched moment", "joint torque", "joint force", "table", "armature", "coupling"],
 )
@@ -135,9 +122,9 @@ def spatial(line: tuple[float, ...], order: str = "crs", reverse: bool = False, 
     axes = ((0.0, 1.2, 1.6), (0.3, -0.8 * way, 0.6 * way))
     joints = (
         pin("A", "ground", "crank", 0.0, 0.0, 0.0, axis=(0.0, 3.0, 0.0)),
-        Universal(name="B", bodies=bodies, anchor=(0.4, 0.0, 0.0), axes=axes[::-1] if reverse else axes),
-        Spherical(name="C", bodies=("rod", "block"), anchor=(1.6, 0.3, 0.5)),
-        Translational(name="D", bodies=("ground", "block"), anchor=(1.6, 0.3, 0.5), axis=line),
+        joint("B", "universal", *bodies, (0.4, 0.0, 0.0), axes=axes[::-1] if reverse else axes),
+        joint("C", "spherical", "rod", "block", (1.6, 0.3, 0.5)),
+        joint("D", "translational", "ground", "block", (1.6, 0.3, 0.5), axis=line),
     )
     return scene([parts[name] for name in order], joints)
 

@@ -17,10 +17,11 @@ from crosscheck.engines.shared.planar_scene import planar_scene
 from crosscheck.judge.metrics import measure, violation_series
 from crosscheck.judge.truth import truth_for
 from mbref.motions.trajectory import Outcome, Trajectory
-from mbref.scene import Body, Driver, Revolute, Scene, Sine, Spherical
+from mbref.scene import Driver, Scene, Sine, Spherical
 from mbref.scenes import SCENES
 from tests.crosscheck.measured import MARGIN, ROUNDING
 from tests.crosscheck.tree_scenes import every_joint
+from tests.helpers.parts import hinge, rod
 
 FAMILY, PROJECTED, NEWTON = "forward, compiled", "projected, compiled", "newton, compiled"
 SINGULAR = {  # scene: relative tolerance, shortest step (s), measured error (m, rad)
@@ -309,18 +310,12 @@ def test_newton_refuses_a_scene_whose_motion_is_not_prescribed() -> None:
 
 def out_of_reach() -> Scene:
     """A driven four-bar whose coupler and rocker are too short for a whole turn of the crank."""
-    places = ((0.0, 0.0), (0.0, 0.3), (0.2, 0.3), (0.4, 0.0))
-    bodies, joints = [], []
-    for k, name in enumerate(("crank", "coupler", "rocker")):
-        middle = [(places[k][i] + places[k + 1][i]) / 2 for i in range(2)]
-        bodies.append(Body(name=name, mass=1.0, inertia=(0.1, 0.1, 0.1), position=(*middle, 0.0)))
+    pins = ((0.0, 0.0, 0.0), (0.0, 0.3, 0.0), (0.2, 0.3, 0.0), (0.4, 0.0, 0.0))
     names = ("ground", "crank", "coupler", "rocker", "ground")
-    for k, joint in enumerate("ABCD"):
-        joints.append(
-            Revolute(name=joint, bodies=(names[k], names[k + 1]), anchor=(*places[k], 0.0), axis=(0, 0, 1))
-        )
+    bodies = [rod(names[k + 1], pins[k], pins[k + 1]) for k in range(3)]
+    joints = [hinge("ABCD"[k], names[k], names[k + 1], pins[k]) for k in range(4)]
     driver = Driver(joint="A", polynomial=(0.0, 3.0))
-    return Scene(name="short", body=tuple(bodies), joint=tuple(joints), driver=(driver,), duration=2.0)
+    return Scene(name="short", body=bodies, joint=joints, driver=(driver,), duration=2.0)
 
 
 def test_planar_scene_leaves_a_mechanism_that_can_leave_its_plane_unchanged() -> None:

@@ -15,14 +15,9 @@ BENNETT = next(mechanism for mechanism in MECHANISMS if mechanism.scene == "benn
 
 
 def run(step: float, error: float, seconds: float = 0.1, outcome: str = "COMPLETED", **changes) -> dict:
-    record = {
-        "asked": {"options": {"step": step}},
-        "outcome": outcome,
-        "metrics": {"error": error, "error_bound": 1e-14},
-        "cost": {"seconds": seconds, "steps": round(1 / step)},
-        "t_end": 1.0,
-    }
-    return {**record, **changes}
+    record = {"asked": {"options": {"step": step}}, "outcome": outcome, "t_end": 1.0}
+    record["metrics"] = {"error": error, "error_bound": 1e-14}
+    return record | {"cost": {"seconds": seconds, "steps": round(1 / step)}} | changes
 
 
 def runs(power: float, floor: float, count: int = 12) -> list[dict]:

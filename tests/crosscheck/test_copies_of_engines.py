@@ -13,7 +13,7 @@ import pytest
 
 from crosscheck.closed_loops.mechanisms import FOLDER
 from crosscheck.conformance.changes.relations import RELATIONS, unchanged
-from crosscheck.engine import Setting, engine, engine_names
+from crosscheck.engine import Setting, engine, engine_names, installed
 from crosscheck.engines.shared.spanning_tree import spanning_tree
 from crosscheck.judge.metrics import error_series, in_scene_order
 from crosscheck.judge.truth import truth_for
@@ -46,22 +46,6 @@ WAYS = {  # engine and setting
 SLOW = ("newton lox", "mjx stock", "mjx single", "warp stock", "casadi projected", "heyoka taylor")
 DRIVEN = ("ondsel kinematics",)  # moves mechanisms whose whole motion is driven
 REFUSED = {("casadi projected", "rotated"), ("heyoka taylor", "rotated")}  # their loops are planar
-MODULES = {
-    "drake": "pydrake",
-    "dart": "dartpy",
-    "bullet": "pybullet",
-    "mujoco": "mujoco",
-    "pinocchio": "pinocchio",
-    "exudyn": "exudyn",
-    "simbody": "opensim",
-    "sundials": "sksundae",
-    "newton": "newton",
-    "mjx": "mujoco.mjx",
-    "warp": "mujoco_warp",
-    "ondsel": "pyondsel",
-    "casadi": "casadi",
-    "heyoka": "heyoka",
-}
 WORSE = 4.0  # times the original's error: another cut changes the error's constant, not its order
 FLOOR = 1e-8  # rounding over a run, and what remains of Newton's method
 
@@ -102,7 +86,8 @@ def own_error(way: str) -> float:
 
 def changed_by(copy: str, way: str) -> tuple[Scene, Trajectory]:
     """Return a copy of the four-bar, and the exact motion of the four-bar changed as the copy."""
-    pytest.importorskip(MODULES[WAYS[way][0]])
+    if not installed(WAYS[way][0]):
+        pytest.skip(f"{WAYS[way][0]} is not installed")
     scene, exact = four_bar(way)
     changed = COPIES[copy].change(scene, exact)
     assert isinstance(changed, Scene), changed

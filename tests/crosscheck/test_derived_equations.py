@@ -24,14 +24,8 @@ PIVOT = Revolute(name="H", bodies=("cart", "rod"), anchor=(0.0, 0.0, 0.0), axis=
 
 def crane(**parts: Any) -> Scene:
     """Return a rod on a hinge of a cart that slides along x."""
-    given = {
-        "name": "s",
-        "body": (CART, ROD),
-        "joint": (RAIL, PIVOT),
-        "duration": 1.0,
-        "gravity": (0.0, -G, 0.0),
-    }
-    return Scene(**{**given, **parts})
+    given = {"body": (CART, ROD), "joint": (RAIL, PIVOT), "gravity": (0.0, -G, 0.0)}
+    return Scene(name="crane", **{**given, **parts})
 
 
 def expected(angle: float, rate: float, moment: float = 0.0) -> np.ndarray:

@@ -18,20 +18,9 @@ def one(
     error: float, *, bound: float = 0.0, seconds: float = 1.0, repeated: bool = False, **metrics: float
 ) -> dict[str, dict[str, Any]]:
     """Return a set of one completed run."""
-    found = {"error": error, "error_bound": bound, **metrics}
-    return {
-        "run": {
-            "outcome": "COMPLETED",
-            "t_end": 1.0,
-            "message": "",
-            "metrics": found,
-            "machine": SAME,
-            "cost": {"seconds": seconds},
-            "asked": {"end": 1.0},
-            "repeated": repeated,
-            "times": [0.0, 1.0],
-        }
-    }
+    run = {"outcome": "COMPLETED", "t_end": 1.0, "message": "", "machine": SAME, "times": [0.0, 1.0]}
+    run |= {"asked": {"end": 1.0}, "repeated": repeated, "cost": {"seconds": seconds}}
+    return {"run": {**run, "metrics": {"error": error, "error_bound": bound, **metrics}}}
 
 
 def said(old: dict[str, Any], new: dict[str, Any]) -> list[str]:
@@ -54,19 +43,17 @@ def test_times_that_differ_by_three_quarters_are_reported_only_if_both_runs_were
     assert said(fast, one(1e-5, seconds=1.75)) == said(one(1e-5, seconds=1.75), fast) == []
 
 
-def test_other_errors_of_a_run_are_compared_if_the_positions_agree():
+@pytest.mark.parametrize(
+    ("metric", "name"),
+    [("velocity_error", "velocities"), ("violation_position", "closure"), ("energy_error", "energy"),
+     ("reaction_error", "reactions")],
+)  # fmt: skip
+def test_other_errors_of_a_run_are_compared_if_the_positions_agree(metric, name):
     """1e-9 differs from 3e-9 and not from 1.9e-9; errors below 1e-11 are rounding."""
-    pairs = {
-        "velocity_error": "velocities",
-        "violation_position": "closure",
-        "energy_error": "energy",
-        "reaction_error": "reactions",
-    }
-    for metric, name in pairs.items():
-        old, new = one(1e-5, **{metric: 1e-9}), one(1e-5, **{metric: 3e-9})
-        assert said(old, new) == [f"{name} 1.00e-09 → 3.00e-09"]
-        assert said(old, one(1e-5, **{metric: 1.9e-9})) == []
-        assert said(one(1e-5, **{metric: 1e-13}), one(1e-5, **{metric: 9e-12})) == []
+    old, new = one(1e-5, **{metric: 1e-9}), one(1e-5, **{metric: 3e-9})
+    assert said(old, new) == [f"{name} 1.00e-09 → 3.00e-09"]
+    assert said(old, one(1e-5, **{metric: 1.9e-9})) == []
+    assert said(one(1e-5, **{metric: 1e-13}), one(1e-5, **{metric: 9e-12})) == []
 
 
 def stored(place, *lines: dict[str, Any], **timings: float):

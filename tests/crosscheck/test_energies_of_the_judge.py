@@ -28,18 +28,8 @@ def still(*places: tuple[float, float, float], angles: tuple[float, ...] = (), *
     turned = np.array([[math.cos(a / 2), 0.0, 0.0, math.sin(a / 2)] for a in angles or (0.0,) * k])
     rest = np.zeros((k, 1, 3))
     arrays = {"velocity": rest, "angular_velocity": rest, **rates}
-    return Trajectory(
-        "s",
-        "e",
-        "1",
-        "m",
-        {},
-        0.5 * np.arange(k),
-        ("b",),
-        np.array(places)[:, None],
-        turned[:, None],
-        **arrays,
-    )
+    poses = np.array(places)[:, None], turned[:, None]
+    return Trajectory("s", "e", "1", "m", {}, 0.5 * np.arange(k), ("b",), *poses, **arrays)
 
 
 def drift(of: Scene, run: Trajectory) -> list[float]:

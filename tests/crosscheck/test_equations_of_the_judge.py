@@ -16,25 +16,9 @@ from crosscheck.judge.joint_loads import joint_wrenches, turning_loads
 from crosscheck.judge.joint_residuals import joint_frames, position_rows, with_ground
 from crosscheck.judge.loads import Motion, wrenches
 from mbref import rotations
-from mbref.scene import (
-    Body,
-    Cylindrical,
-    Distance,
-    Driver,
-    Fixed,
-    Force,
-    Moment,
-    Planar,
-    Revolute,
-    Scene,
-    Sine,
-    Spherical,
-    TorsionSpring,
-    Translational,
-    Universal,
-)
+from mbref.scene import Body, Driver, Fixed, Force, Moment, Revolute, Scene, Sine, TorsionSpring
+from tests.helpers.parts import X, Y, Z, joint
 
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 GROUND_B = ("ground", "b")
 UNIT = np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -102,9 +86,9 @@ def test_pieces_of_a_scenes_functions_end_at_rows_of_tables_and_at_start_and_sto
 # --- joints -----------------------------------------------------------------------------------------------
 
 
-def residual(joint, place, q=UNIT, driver: tuple[Driver, ...] = (), t: float = 0.0) -> list[float]:
+def residual(given: dict, place, q=UNIT, driver: tuple[Driver, ...] = (), t: float = 0.0) -> list[float]:
     """Return residuals (m, rad) of a joint between the ground and a body at a pose, for an anchor at 0."""
-    scene = Scene(name="s", body=(body(),), joint=(joint,), driver=driver)
+    scene = Scene(name="s", body=(body(),), joint=(given,), driver=driver)
     pose = with_ground(np.array([place], dtype=float), np.array([q], dtype=float))
     return position_rows(joint_frames(scene)[0], np.asarray(t), *pose).tolist()
 
@@ -114,34 +98,35 @@ def about(axis, angle: float) -> np.ndarray:
     return np.concatenate([[math.cos(angle / 2)], math.sin(angle / 2) * np.array(axis)])
 
 
-AT = {"bodies": GROUND_B, "anchor": (0.0, 0.0, 0.0)}
+def at_origin(kind: str, **fields) -> dict:
+    """Return a joint J between the ground and the body b, with its anchor at the origin."""
+    return joint("J", kind, "ground", "b", **fields)
 
 
 def test_residuals_of_joints_are_displacements_and_angles_across_their_axis():
     """A joint along z measures across it along y first, then along -x."""
-    at = AT
     moved = (0.1, 0.2, 0.3)
-    fixed, hinge = Fixed(name="J", **at), Revolute(name="J", axis=Z, **at)
+    fixed, hinge = at_origin("fixed"), at_origin("revolute", axis=Z)
     assert residual(fixed, moved, about(Y, 0.4)) == pytest.approx([0.2, -0.1, 0.3, 0.4, 0.0, 0.0])
     assert residual(fixed, moved, -about(X, 0.4))[3:] == pytest.approx([0.0, -0.4, 0.0])
     assert residual(hinge, moved, about(Z, 2.0)) == pytest.approx([0.2, -0.1, 0.3, 0.0, 0.0])
     assert residual(hinge, (0, 0, 0), about(Y, 2.0))[3:] == pytest.approx([2.0, 0.0])
-    assert residual(Spherical(name="J", **at), moved, about(X, 1.0)) == pytest.approx([0.2, -0.1, 0.3])
-    rail = Translational(name="J", axis=Z, **at)
+    assert residual(at_origin("spherical"), moved, about(X, 1.0)) == pytest.approx([0.2, -0.1, 0.3])
+    rail = at_origin("translational", axis=Z)
     assert residual(rail, moved, about(Z, 0.3)) == pytest.approx([0.2, -0.1, 0.0, 0.0, 0.3])
-    sleeve = Cylindrical(name="J", axis=Z, **at)
+    sleeve = at_origin("cylindrical", axis=Z)
     assert residual(sleeve, moved, about(X, 0.3)) == pytest.approx([0.2, -0.1, 0.0, -0.3])
-    assert residual(Planar(name="J", axis=Z, **at), moved, about(Y, -0.3)) == pytest.approx([0.3, -0.3, 0.0])
-    cross = Universal(name="J", axes=(X, Y), **at)
+    assert residual(at_origin("planar", axis=Z), moved, about(Y, -0.3)) == pytest.approx([0.3, -0.3, 0.0])
+    cross = at_origin("universal", axes=(X, Y))
     assert residual(cross, moved, about(Z, 0.3))[3] == pytest.approx(-0.3), "y turns towards -x"
-    rod = Distance(name="J", bodies=GROUND_B, anchors=((0.0, 0.0, 0.0), (2.0, 0.0, 0.0)))
+    rod = at_origin("distance", anchors=((0.0, 0.0, 0.0), (2.0, 0.0, 0.0)))
     assert residual(rod, (-2.0, 3.0, 4.0)) == pytest.approx([3.0]), "5 m instead of 2 m"
 
 
 def test_residual_of_a_driver_is_the_coordinate_less_its_law():
     """The law is 0.5 t: 2 - 0.5 rad at 1 s, 0.3 rad after a full turn at 4π s, 0.3 - 0.5 m at 1 s."""
     law = (Driver(joint="J", polynomial=(0.0, 0.5)),)
-    hinge, rail = Revolute(name="J", axis=Z, **AT), Translational(name="J", axis=Z, **AT)
+    hinge, rail = at_origin("revolute", axis=Z), at_origin("translational", axis=Z)
     assert residual(hinge, (0, 0, 0), about(Z, 2.0), law, 1.0)[-1] == pytest.approx(1.5)
     assert residual(hinge, (0, 0, 0), about(Z, 0.3), law, 4 * math.pi)[-1] == pytest.approx(0.3)
     assert residual(rail, (0.1, 0.2, 0.3), UNIT, law, 1.0)[-1] == pytest.approx(0.3 - 0.5)

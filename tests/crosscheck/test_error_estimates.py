@@ -13,9 +13,10 @@ from crosscheck.processes.pool import run_isolated
 from crosscheck.study.grid import Case, run_case
 from crosscheck.study.record_view import public
 from mbref.motions.trajectory import Outcome
-from mbref.scene import Body, Revolute, Scene
+from mbref.scene import Scene
 from mbref.scenes import SCENES
 from tests.helpers.fake_engines import FAKES, Fake
+from tests.helpers.parts import hinge, rod
 
 SCENE = SCENES["spatial_slider_crank_gravity"]().with_(duration=0.3)
 TIMES = np.linspace(0.0, 0.3, 7)
@@ -53,19 +54,9 @@ def test_an_engine_without_estimates_has_none_in_its_record():
 
 def test_the_message_of_an_estimated_run_says_that_its_motion_is_sensitive():
     """Three rods in a row, released from a horizontal line, are chaotic."""
-    bodies = tuple(
-        Body(name=f"rod{k}", mass=1.0, inertia=(0.02, 0.02, 0.02), position=(0.4 * k + 0.2, 0.0, 0.0))
-        for k in range(3)
-    )
-    joints = tuple(
-        Revolute(
-            name=f"P{k}",
-            bodies=(f"rod{k - 1}" if k else "ground", f"rod{k}"),
-            anchor=(0.4 * k, 0.0, 0.0),
-            axis=(0.0, 0.0, 1.0),
-        )
-        for k in range(3)
-    )
+    names, pins = ("ground", "a", "b", "c"), [(0.4 * k, 0.0, 0.0) for k in range(4)]
+    bodies = [rod(names[k + 1], pins[k], pins[k + 1]) for k in range(3)]
+    joints = [hinge(f"P{k}", names[k], names[k + 1], pins[k]) for k in range(3)]
     rods = Scene(name="rods", gravity=(0.0, -9.81, 0.0), duration=8.0, body=bodies, joint=joints)
     setting = Setting("taylor", {"rtol": 1e-7})
     run = serve.run_estimated("mbref", rods, np.linspace(0.0, 8.0, 9), setting, 10.0)

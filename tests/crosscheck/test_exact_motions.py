@@ -49,14 +49,8 @@ def test_gausss_principle_turns_a_free_asymmetric_top_by_jacobis_elliptic_functi
     """Euler's solution of the angular velocity about body axes: cn, sn and dn (Landau and Lifshitz, §
     37)."""
     moments, spin = np.array([0.02, 0.03, 0.045]), np.array([4.0, 0.0, 5.0])
-    body = Body(
-        name="top",
-        mass=1.0,
-        inertia=moments,
-        position=(0.0, 0.0, 0.0),
-        velocity=(0.0, 0.0, 0.0),
-        angular_velocity=spin,
-    )
+    at_rest = {"position": (0.0, 0.0, 0.0), "velocity": (0.0, 0.0, 0.0)}
+    body = Body(name="top", mass=1.0, inertia=moments, angular_velocity=spin, **at_rest)
     scene, times = Scene(name="top", duration=1.0, body=(body,)), np.linspace(0.0, 1.0, 6)
     energy2, momentum2 = moments @ spin**2, np.sum((moments * spin) ** 2)
     a, b, c = moments[::-1]  # of largest, middle, least moment, for momentum² > energy × the middle

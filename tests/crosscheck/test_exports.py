@@ -26,11 +26,6 @@ def test_crosscheck_exports_functions_beside_its_modules_engine_and_study() -> N
     assert crosscheck.run_study is crosscheck.study.study
 
 
-def test_an_unknown_attribute_of_crosscheck_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
-        crosscheck.nothing  # noqa: B018
-
-
 def test_importing_crosscheck_imports_neither_numpy_nor_numba_nor_mbref() -> None:
     code = "import sys, crosscheck; print(sorted({m.partition('.')[0] for m in sys.modules}))"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout

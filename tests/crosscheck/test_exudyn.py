@@ -150,15 +150,9 @@ def test_exudyn_keeps_joints_of_every_kind_closed():
 def test_exudyn_tumbles_a_torque_free_body_as_the_truth():
     """The judge knows the motion of a body under gravity alone; MARGIN times the measured error is
     allowed."""
-    body = Body(
-        name="top",
-        mass=2.0,
-        inertia=INERTIA,
-        position=(1.0, 2.0, 3.0),
-        orientation=TURNED,
-        velocity=(1.0, 0.0, -0.5),
-        angular_velocity=(3.0, 8.0, -2.0),
-    )
+    pose = {"position": (1.0, 2.0, 3.0), "orientation": TURNED}
+    twist = {"velocity": (1.0, 0.0, -0.5), "angular_velocity": (3.0, 8.0, -2.0)}
+    body = Body(name="top", mass=2.0, inertia=INERTIA, **pose, **twist)
     scene = Scene(name="top", body=(body,), gravity=(0.0, -9.81, 0.0), duration=1.0)
     measured = measure(scene, run(scene, np.linspace(0, 1, 6), "tuned", 2e-3), truth_for(scene))
     assert measured["error"] < MARGIN * TUMBLING, measured

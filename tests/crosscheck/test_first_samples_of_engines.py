@@ -19,25 +19,11 @@ from crosscheck.judge.joint_reactions import compare
 from crosscheck.judge.metrics import in_scene_order
 from crosscheck.judge.reaction_balance import with_exact_reactions
 from mbref.motions.trajectory import Outcome, Trajectory
-from mbref.scene import (
-    Coupling,
-    Cylindrical,
-    Factor,
-    Joint,
-    JointForce,
-    JointTorque,
-    Planar,
-    Revolute,
-    Scene,
-    Sine,
-    SlideSpring,
-    Spring,
-    TorsionSpring,
-    Translational,
-)
+from mbref.scene import Joint, JointForce, JointTorque, Scene, SlideSpring, Spring, TorsionSpring
 from mbref.scenes import SCENES as SHIPPED
 from tests.crosscheck.driven_arm import driven_arm
 from tests.crosscheck.tree_scenes import body, driven, every_joint, ring
+from tests.helpers.parts import hinge, joint, slide
 
 WAYS = {  # engine: a setting, and the largest relative difference of its accelerations and reactions
     "mujoco": (Setting("forward", {"rtol": 1e-9, "min_step": 1e-4, "beta": 100.0, "hard": 1e-7}), 1e-6),
@@ -74,6 +60,10 @@ def reversed_arm() -> Scene:
     return arm.with_(name="reversed arm", joint=joints)
 
 
+SINE = {"amplitude": 2.0, "frequency": 3.0, "phase": 0.4}
+ENDS = ((0.3, 1.4, 0.1), (-0.7, 0.3, 0.2))  # m, of the spring between wheel and puck
+
+
 def loaded() -> Scene:
     """Return a scene with every load of a joint; factors of two loads are not 1 at t = 0."""
     bodies = (
@@ -83,27 +73,19 @@ def loaded() -> Scene:
         body("puck", (-0.8, 0.2, 0.1), (0.3, 0.1, 0.2), 0.7, velocity=(0.5, -0.2, 0.0)),
     )
     joints = (
-        Revolute(name="A", bodies=("ground", "arm"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),
-        Translational(name="C", bodies=("sled", "ground"), anchor=(0.0, 1.0, 0.3), axis=(0.6, 0.8, 0.0)),
-        Cylindrical(name="D", bodies=("sled", "wheel"), anchor=(0.1, 1.2, 0.2), axis=(0.0, 0.6, 0.8)),
-        Planar(name="P", bodies=("ground", "puck"), anchor=(-0.8, 0.2, 0.1), axis=(0.0, 0.0, 1.0)),
+        hinge("A", "ground", "arm", (0.0, 0.0, 0.0)),
+        slide("C", "sled", "ground", (0.0, 1.0, 0.3), (0.6, 0.8, 0.0)),
+        joint("D", "cylindrical", "sled", "wheel", (0.1, 1.2, 0.2), axis=(0.0, 0.6, 0.8)),
+        joint("P", "planar", "ground", "puck", (-0.8, 0.2, 0.1), axis=(0.0, 0.0, 1.0)),
     )
     loads = (
         TorsionSpring(joint="A", stiffness=4.0, damping=0.3, natural_angle=0.4),
-        JointTorque(joint="D", torque=0.7, factor=Factor(polynomial=(1.5, 2.0))),
+        JointTorque(joint="D", torque=0.7, factor={"polynomial": (1.5, 2.0)}),
         SlideSpring(joint="D", stiffness=40.0, damping=0.8, natural_displacement=-0.1),
-        JointForce(joint="C", force=-5.0, factor=Factor(sine=Sine(amplitude=2.0, frequency=3.0, phase=0.4))),
-        Spring(
-            bodies=("wheel", "puck"),
-            points=((0.3, 1.4, 0.1), (-0.7, 0.3, 0.2)),
-            stiffness=30.0,
-            damping=0.5,
-            natural_length=1.0,
-        ),
+        JointForce(joint="C", force=-5.0, factor={"sine": SINE}),
+        Spring(bodies=("wheel", "puck"), points=ENDS, stiffness=30.0, damping=0.5, natural_length=1.0),
     )
-    return Scene(
-        name="loaded", gravity=(0.5, -9.81, 1.0), duration=1.0, body=bodies, joint=joints, load=loads
-    )
+    return Scene(name="loaded", gravity=(0.5, -9.81, 1.0), body=bodies, joint=joints, load=loads)
 
 
 def geared() -> Scene:
@@ -114,28 +96,15 @@ def geared() -> Scene:
         body("rack", (0.0, 2.0, 0.3), (0.2, -0.3, 0.1), 1.5, velocity=(0.4, 0.0, 0.0)),
     )
     joints = (
-        Revolute(
-            name="A", bodies=("ground", "first"), anchor=(0.02, 0.0, 0.0), axis=(0.0, 0.0, 1.0), armature=0.3
-        ),
-        Revolute(name="B", bodies=("ground", "second"), anchor=(1.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),
-        Translational(
-            name="C", bodies=("ground", "rack"), anchor=(0.0, 2.0, 0.0), axis=(1.0, 0.0, 0.0), armature=0.4
-        ),
+        hinge("A", "ground", "first", (0.02, 0.0, 0.0), armature=0.3),
+        hinge("B", "ground", "second", (1.0, 0.0, 0.0)),
+        slide("C", "ground", "rack", (0.0, 2.0, 0.0), armature=0.4),
     )
-    gears = (
-        Coupling(name="gears", joints=("A", "B"), ratio=-2.5),
-        Coupling(name="teeth", joints=("A", "C"), ratio=0.2),
-    )
+    ratios = {"AB": -2.5, "AC": 0.2}
+    gears = [{"name": pair, "joints": tuple(pair), "ratio": ratio} for pair, ratio in ratios.items()]
     load = (JointTorque(joint="B", torque=1.25),)
-    return Scene(
-        name="geared",
-        gravity=(0.5, -9.0, 1.0),
-        duration=1.0,
-        body=bodies,
-        joint=joints,
-        coupling=gears,
-        load=load,
-    )
+    parts = {"body": bodies, "joint": joints, "coupling": gears, "load": load}
+    return Scene(name="geared", gravity=(0.5, -9.0, 1.0), **parts)
 
 
 SCENES = {

@@ -12,20 +12,10 @@ from crosscheck.engines.shared.initial_velocities import initial_rates, twist_ma
 from crosscheck.engines.shared.spanning_tree import GROUND_LINK, Link, Tree, effective_mass, spanning_tree
 from crosscheck.judge.constraints import initial_twists
 from mbref import rotations
-from mbref.scene import (
-    JOINT_TYPES,
-    Body,
-    Coupling,
-    Distance,
-    Driver,
-    Fixed,
-    Revolute,
-    Scene,
-    Sine,
-    Translational,
-)
+from mbref.scene import JOINT_TYPES, Body, Coupling, Distance, Driver, Scene, Sine
 from mbref.scenes import SCENES
 from tests.crosscheck.tree_scenes import INERTIA, driven, every_joint, ring
+from tests.helpers.parts import X, block, hinge, joint
 
 KINDS = tuple(JOINT_TYPES.values())
 ROUNDING = 1e-12  # of the largest value, after sums of up to 15 links
@@ -155,18 +145,13 @@ def test_a_loop_is_cut_at_its_joint_with_most_freedoms(kind: str) -> None:
     assert cut.type == kind, f"cut the {cut.type} {cut.name}, not the {kind}"
 
 
-@pytest.mark.parametrize("kind", [Fixed, Translational])
-def test_a_body_is_split_in_halves_to_cut_a_loop_of_equal_joints(kind: type) -> None:
+@pytest.mark.parametrize(("kind", "axis"), [("fixed", {}), ("translational", {"axis": X})])
+def test_a_body_is_split_in_halves_to_cut_a_loop_of_equal_joints(kind: str, axis: dict) -> None:
     """Two bodies of 2 kg and three joints in a loop."""
-    axis = {"axis": (1.0, 0.0, 0.0)} if kind is Translational else {}
     pairs = (("ground", "a"), ("a", "b"), ("b", "ground"))
-    scene = Scene(
-        name="stiff",
-        body=tuple(Body(name=n, mass=2.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0)) for n in "ab"),
-        joint=tuple(
-            kind(name=f"j{i}", bodies=p, anchor=(0.0, 0.0, 0.0), **axis) for i, p in enumerate(pairs)
-        ),
-    )
+    bodies = [block(name, (0.0, 0.0, 0.0), 2.0) for name in "ab"]
+    joints = [joint(f"j{i}", kind, *pair, **axis) for i, pair in enumerate(pairs)]
+    scene = Scene(name="stiff", body=bodies, joint=joints)
     tree = spanning_tree(scene)
     masses = [link.mass for link in tree.links if link.body == 1]
     assert masses == [1.0, 1.0], f"body b is in parts of {masses} kg, expected two equal ones of 1 kg"
@@ -233,10 +218,7 @@ def hinged(*pairs: tuple[str, str]) -> Scene:
     bodies = [
         Body(name=n, mass=1.0, inertia=INERTIA, position=(float(k), 1.0, 0.0)) for k, n in enumerate(names)
     ]
-    joints = [
-        Revolute(name=f"j{k}", bodies=pair, anchor=(float(k), 0.0, 0.0), axis=(0.0, 0.0, 1.0))
-        for k, pair in enumerate(pairs)
-    ]
+    joints = [hinge(f"j{k}", *pair, (float(k), 0.0, 0.0)) for k, pair in enumerate(pairs)]
     return Scene(name="hinged", body=bodies, joint=joints)
 
 

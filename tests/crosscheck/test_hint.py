@@ -94,11 +94,11 @@ def test_result_of_verify_on_a_failing_engine_has_the_hint(monkeypatch):
 
 @pytest.mark.parametrize("name", [*NAMES, "force load", "turntable"])
 def test_terms_of_the_judge_give_the_accelerations_of_gausss_principle(name):
-    """Solved from mass matrix, forces and rows, in the state at a seventh of a second of the principle's
-    motion."""
+    """Solved from mass matrix, forces and rows, in a later state of the principle's motion; differences are
+    below 1e-6 of the largest acceleration (m/s² or rad/s²)."""
     scene = KNOWN[name].scene
     motion = gauss_motion(scene, tuple(np.linspace(0.0, 0.2 * scene.duration, 5).tolist()))
     own = np.concatenate([motion.acceleration[3], motion.angular_acceleration[3]], axis=-1)
     found = accelerations(scene, terms_at(scene, motion, 3)).reshape(-1, 6)
     found[:, 3:] /= scene_length(scene)
-    assert np.allclose(found, own, rtol=1e-6, atol=1e-6 * np.abs(own).max()), (found, own)
+    assert np.abs(found - own).max() < 1e-6 * np.abs(own).max(), (found, own)
