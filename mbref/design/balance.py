@@ -7,6 +7,7 @@ are compared by these displacements instead of accelerations, so that stiff spri
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 
 import numpy as np
@@ -28,6 +29,8 @@ BETTER = 0.9  # largest ratio of displacements of successive refinements
 UNDECIDED = 1e-4  # largest distance that is tried of an equilibrium without stiffness / length, or rad
 ONE_POSE = 1e-6  # distance / length, or rad, below which two poses are one
 LINKS = 40  # largest number of steps between two poses of one family
+STIFF = 0.05  # displacement by the forces / length, or rad, below which a direction is stiff
+MOST_RETURNS = 12  # largest number of steps along stiff directions from a displaced pose
 
 
 class Newton:
@@ -79,6 +82,43 @@ class Newton:
         parts = np.abs(self.parts(off))
         return float(np.linalg.norm(parts / np.maximum(held, 1e-300) * self.sizes))
 
+    def moved(self, y: np.ndarray) -> Tangent | None:
+        """Return the tangent at q(y), after a return to the balance of stiff directions; None if no pose on
+        the constraints is found.
+
+        A long step along a soft direction leaves this balance by its curvature, as it leaves the constraints.
+        """
+        moved, is_stiff, before = self.tangent.moved(y), self._is_stiff, np.inf
+        if moved is None or not is_stiff.any() or moved.freedoms != self.tangent.freedoms:
+            return moved
+        for _ in range(MOST_RETURNS):
+            parts = self.parts(moved.off_balance())
+            moves = -np.where(is_stiff, parts, 0.0) / np.where(is_stiff, self.stiffness, 1.0)
+            size = float(np.linalg.norm(moves * self.sizes))
+            if not PLACED < size < BETTER * before:
+                return moved
+            back = moved.moved(moved.coordinates(self.tangent.basis @ (self.directions @ moves)))
+            if back is None or back.freedoms != moved.freedoms:
+                return moved
+            moved, before = back, size
+        return moved
+
+    @property
+    def _is_stiff(self) -> np.ndarray:
+        """Directions (f,) along which the forces on the bodies give a small displacement."""
+        pushes = np.abs(self.left.T) @ self.tangent.pushes
+        return np.asarray(pushes * self.sizes < STIFF * self.stiffness)
+
+    def softened(self, y: np.ndarray, forces: np.ndarray) -> np.ndarray:
+        """Return a direction y (f,) with less of each direction that a spring holds.
+
+        Its part is the displacement by forces on the bodies, of sizes (2 nb,), over a stride, at most one.
+        """
+        pushes = (np.abs(self.left.T) @ self.tangent.pushes_of(forces)) * self.sizes
+        free = np.maximum(pushes / STRIDE, self.stiffness.min(initial=np.inf))
+        share = np.minimum(1.0, free / np.maximum(self.stiffness, 1e-300))
+        return np.asarray(self.directions @ (share * (self.directions.T @ y)))
+
     def away(self) -> np.ndarray:
         """Return a displacement y (f,) as far as the equilibrium may be from the pose."""
         parts, most = np.maximum(np.abs(self.parts(self.off)), self.rounding), UNDECIDED / self.sizes
@@ -120,7 +160,7 @@ def _damped_step(here: Newton, freedoms: int) -> Tangent | None:
     """Return the pose after a share of the Newton step that brings the balance nearer."""
     step, level = here.step(), here.level(here.off)
     for share in STEP_SHARES:
-        moved = here.tangent.moved(share * step)
+        moved = here.moved(share * step)
         if moved is not None and here.level(moved.off_balance()) < (1 - LEAST_GAIN * share) * level:
             return moved
     return None
@@ -190,27 +230,20 @@ def starts_from(first: Tangent, freedoms: int, count: int) -> Iterator[Tangent]:
         wish = drawn if old is None else old + 0.3 * rotations.unit(drawn)
         if old is None and side and directions[0] is not None:
             wish = -directions[0]
-        ahead = _soft_direction(tangent, tangent.basis.T @ wish, first.forces)
-        moved = tangent.moved(STRIDE * ahead)
+        direction, moved = _stride(tangent, tangent.basis.T @ wish, first.forces)
         if moved is None or moved.freedoms != freedoms:
             directions[side] = None
             continue
-        directions[side] = rotations.unit(tangent.basis @ ahead)
-        ends[side] = moved
+        directions[side], ends[side] = direction, moved
         yield moved
 
 
-def _soft_direction(tangent: Tangent, y: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """Return the direction y (f,) of unit length, with less of each direction that a spring holds.
-
-    Its part is the displacement by forces on the bodies, of sizes (2 nb,), over a stride, at most one.
-    """
-    try:
-        left, stiffness, right = np.linalg.svd(tangent.slope())
-    except OffConstraints:
-        return y / (np.linalg.norm(tangent.basis @ y) or 1.0)
-    pushes = (np.abs(left.T) @ tangent.pushes_of(forces)) * np.linalg.norm(tangent.basis @ right.T, axis=0)
-    free = np.maximum(pushes / STRIDE, stiffness.min())
-    share = np.minimum(1.0, np.where(stiffness > free, free / np.maximum(stiffness, 1e-300), 1.0))
-    found = right.T @ (share * (right @ y))
-    return np.asarray(found / (np.linalg.norm(tangent.basis @ found) or 1.0))
+def _stride(tangent: Tangent, y: np.ndarray, forces: np.ndarray) -> tuple[np.ndarray, Tangent | None]:
+    """Return a direction (n,) of unit length near y (f,) that displaces soft springs, and the pose after a
+    stride along it."""
+    here: Newton | Tangent = tangent
+    with contextlib.suppress(OffConstraints):
+        here = Newton(tangent)
+        y = here.softened(y, forces)
+    y = y / (np.linalg.norm(tangent.basis @ y) or 1.0)
+    return rotations.unit(tangent.basis @ y), here.moved(STRIDE * y)

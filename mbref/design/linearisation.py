@@ -26,6 +26,7 @@ from mbref.scene import SceneError
 # increment of difference quotients / mechanism's length: truncation and rounding are both about 1e-13
 DIFFERENCE_STEP = 0.005
 SHORT = 0.04  # factor on DIFFERENCE_STEP for differences of second order
+UNEQUAL = 1e4  # largest / least stiffness, above which errors of the largest disturb the least
 CENTRAL = (4 / 5, -1 / 5, 4 / 105, -1 / 280)  # weights of central differences of order 8
 WEIGHTLESS = 1e-20  # mass along a tangent / largest mass, below which no mass resists the forces
 EPSILON = float(np.finfo(float).eps)
@@ -133,9 +134,21 @@ class Tangent:
         return self.frame.relative(self.model, self.q, still, self.at_rest) / self.model.units
 
     def slope(self, at: np.ndarray | None = None) -> np.ndarray:
-        """Return A = ∂y''/∂y (f, f) at y, by default at the pose, by differences of second order."""
-        zero, h = np.zeros(self.freedoms), SHORT * DIFFERENCE_STEP / self.sizes
-        place = zero if at is None else at
+        """Return A = ∂y''/∂y (f, f) at y, by default at the pose, by differences of second order.
+
+        The stiffest direction has the largest error, which enters softer directions. Where they are far
+        softer, Richardson's extrapolation reduces it to fourth order.
+        """
+        place = np.zeros(self.freedoms) if at is None else at
+        found = self._differences(place, SHORT * DIFFERENCE_STEP)
+        stiffness = np.linalg.svd(found, compute_uv=False)
+        if stiffness.max(initial=0.0) > UNEQUAL * stiffness.min(initial=np.inf):
+            found += (found - self._differences(place, 2 * SHORT * DIFFERENCE_STEP)) / 3
+        return found
+
+    def _differences(self, place: np.ndarray, step: float) -> np.ndarray:
+        """Return A (f, f) at y by central differences with a step, lengths or rad."""
+        zero, h = np.zeros(self.freedoms), step / self.sizes
         pairs = [
             (self.accelerations(place + move, zero), self.accelerations(place - move, zero))
             for move in np.diag(h)
