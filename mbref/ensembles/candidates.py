@@ -124,6 +124,7 @@ class Evaluations:
             poses=packs.start(),
             mass=packs.mass,
             length=packs.length,
+            scenes=packs.scenes,
             bodies=packs.listed,
             terms=self._at_start,
             model_of=lambda place: Model(packs.scenes[place], packs, place),

@@ -19,12 +19,13 @@ from mbref.equations.initial_velocities import (
     given_velocities,
     joint_fault,
     sparse_velocities,
+    speed_at_rest,
 )
 from mbref.equations.model import Model, Terms
 from mbref.equations.units import unit_equations
 from mbref.linear_algebra.least_norm import least_norm
 from mbref.linear_algebra.minimum_norm import MinimumNorm
-from mbref.scene import Body, SceneError
+from mbref.scene import Body, Scene, SceneError
 
 LARGE = 40  # rows; for more, dense singular values take longer than sparse factors
 MET = 1e-14  # gap relative to the largest coordinate that is rounding
@@ -66,8 +67,8 @@ class Start:
 class Alike(NamedTuple):
     """Scenes of equal structure whose consistent starts are computed together.
 
-    Fields are coordinates (s, 7 nb) of their poses, masses (s, n), lengths (s,) in m, and the bodies of each
-    of the s scenes. ``terms`` evaluates the scenes with indices (k,), for coordinates (k, 7 nb) and
+    Fields are coordinates (s, 7 nb) of their poses, masses (s, n), lengths (s,) in m, and each of the
+    s scenes with its bodies. ``terms`` evaluates the scenes with indices (k,), for coordinates (k, 7 nb) and
     velocities (k, n), and returns blocks (k, m, 12). ``model_of`` returns the model of a scene by index.
     """
 
@@ -75,6 +76,7 @@ class Alike(NamedTuple):
     poses: np.ndarray
     mass: np.ndarray
     length: np.ndarray
+    scenes: Sequence[Scene]
     bodies: Sequence[Sequence[Body]]
     terms: Callable[[np.ndarray, np.ndarray, np.ndarray], Terms]
     model_of: Callable[[int], Model]
@@ -92,6 +94,7 @@ def _alone(model: Model, t: float = 0.0, value: Any = 0.0) -> Alike:
         poses=model.start()[None],
         mass=model.mass[None],
         length=np.array([model.length]),
+        scenes=[model.scene],
         bodies=[model.bodies],
         terms=lambda places, q, v: model.terms(np.full(len(q), t), q, v).less(value),
         model_of=lambda place: model,
@@ -121,7 +124,8 @@ def consistent_starts(scenes: Alike) -> list[Start | SceneError]:
     by_body[:, :, 1] = 1 / scenes.length[:, None, None]
     scale = by_body.reshape(v.shape)
     jacobian = terms.blocks if model.m > LARGE else terms.jacobian * scale[:, None]
-    rates = map(Rates, v, given, terms.nu, scale, jacobian, scenes.mass, scenes.length)
+    rest = map(speed_at_rest, scenes.scenes, scenes.length.tolist())
+    rates = map(Rates, v, given, terms.nu, scale, jacobian, scenes.mass, scenes.length, rest)
     states = enumerate(zip(q, before.tolist(), rates, strict=True))
     return [faults.get(k) or _start(scenes, k, *state) for k, state in states]
 

@@ -14,10 +14,13 @@ from mbref.equations.model import Model
 from mbref.equations.units import unit_equations
 from mbref.linear_algebra.least_norm import least_norm_and_null_space
 from mbref.linear_algebra.minimum_norm import MinimumNorm
-from mbref.scene import Body, SceneError
+from mbref.scene import Body, Scene, SceneError
 
 START_RANK_TOLERANCE = 1e-5  # smaller singular values stay uncorrected: the rank may drop at the start
 GROSS = 0.05  # violation / scene's length, or violation / given velocities, above which the data are faulty
+# speed / speed that gravity gives over the scene's length, or length / duration, below which a body rests:
+# rounding, also of a program that wrote the file, leaves less
+AT_REST = 1e-12
 # violation by drivers / speed, above which drivers contradict the joints; rounding leaves less
 CONTRADICTED = 1e-3
 # weight of open velocities / weight of given velocities; number of compensating iterations
@@ -29,6 +32,7 @@ class Rates(NamedTuple):
     """The velocity equations of a scene: given velocities (n,), their mask, ν, Φ_q, M (n,) and length (m).
 
     Φ_q (m, n) refers to velocities over their ``scale`` (n,); a large scene has blocks (m, 12) of Φ_q itself.
+    Over its scale, a velocity below ``rest`` (m/s) is rounding.
     """
 
     v: np.ndarray
@@ -38,6 +42,13 @@ class Rates(NamedTuple):
     jacobian: np.ndarray
     mass: np.ndarray
     length: float
+    rest: float
+
+
+def speed_at_rest(scene: Scene, length: float) -> float:
+    """Return the speed (m/s) up to which bodies of a scene of a length (m) are at rest."""
+    falling = np.sqrt(length * np.linalg.norm(scene.gravity))
+    return float(AT_REST * max(falling, length / scene.duration))
 
 
 def given_velocities(bodies: Sequence[Sequence[Body]], q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -81,14 +92,14 @@ def dense_velocities(model: Model, rates: Rates) -> tuple[np.ndarray, float, boo
     Among the solutions the result is nearest to the given velocities (angular velocities times the scene's
     length); undetermined velocities are least in the metric of M.
     """
-    v, given, nu, scale, jacobian, mass, _ = rates
+    v, given, nu, scale, jacobian, mass, _, rest = rates
     wanted = v[given] / scale[given]
     if not (wanted.any() or nu.any()):
         return np.zeros(model.n), 0.0, not given.all()
     unit, rhs = unit_equations(jacobian, nu)
     x, open_ = least_norm_and_null_space(unit, rhs, START_RANK_TOLERANCE)
     off = np.abs(unit @ x - rhs)
-    if off.max(initial=0.0) > CONTRADICTED * np.abs(x).max(initial=0.0):
+    if off.max(initial=0.0) > max(rest, CONTRADICTED * np.abs(x).max(initial=0.0)):
         raise _contradiction(model, int(np.argmax(off)))
     if open_.size and wanted.size:
         step, still_open = least_norm_and_null_space(open_[given], wanted - x[given], START_RANK_TOLERANCE)
@@ -96,25 +107,27 @@ def dense_velocities(model: Model, rates: Rates) -> tuple[np.ndarray, float, boo
     as_given = x.copy()
     as_given[given] = wanted
     residual = np.abs(jacobian @ as_given - nu)
-    if np.abs(x[given] - wanted).max(initial=0.0) > GROSS * np.abs(wanted).max(initial=0.0):
+    miss = np.abs(x[given] - wanted).max(initial=0.0)
+    if miss > max(rest, GROSS * np.abs(wanted).max(initial=0.0)):
         what = f"velocities given to bodies violate it by {residual.max():.3g} m/s or rad/s"
         raise joint_fault(model, int(np.argmax(residual)), what)
     if open_.size:
         weight = np.sqrt(mass) * scale
         x = x - open_ @ np.linalg.lstsq(weight[:, None] * open_, weight * x, rcond=START_RANK_TOLERANCE)[0]
+    off = float(np.abs(unit @ as_given - rhs).max(initial=0.0))
     size = max(np.abs(x).max(), np.abs(as_given).max())
-    return x * scale, float(np.abs(unit @ as_given - rhs).max(initial=0.0) / size), bool(open_.size)
+    return x * scale, 0.0 if off <= rest else off / size, bool(open_.size)
 
 
 def sparse_velocities(model: Model, rates: Rates) -> tuple[np.ndarray, float, bool]:
     """Return velocities by sparse solutions: nearest to the given velocities first, then of least norm."""
     from scipy.sparse import csr_array, vstack
 
-    v, given, nu, scale, blocks, mass, length = rates
+    v, given, nu, scale, blocks, mass, length, rest = rates
     jacobian = model.structure.sparse(blocks)
     x = MinimumNorm(jacobian, scale**-2)(nu)
     off = np.abs(jacobian @ x - nu)
-    if np.max(off) > CONTRADICTED * np.max(np.abs(x / scale)):
+    if np.max(off) > max(rest, CONTRADICTED * np.max(np.abs(x / scale))):
         raise _contradiction(model, int(np.argmax(off)))
     nearest, x, aim = MinimumNorm(jacobian, np.where(given, 1.0, OPEN_WEIGHT) / scale**2), v, v
     for _ in range(REPEATS):
@@ -126,9 +139,9 @@ def sparse_velocities(model: Model, rates: Rates) -> tuple[np.ndarray, float, bo
     x = MinimumNorm(csr_array(vstack([jacobian, selection])), weight)(np.append(nu, x[given]))
     residual = np.abs(jacobian @ np.where(given, v, x) - nu)
     miss, wanted = np.abs((x - v) / scale)[given], np.abs(v / scale)[given]
-    if np.max(miss, initial=0.0) > GROSS * np.max(wanted, initial=0.0):
+    if np.max(miss, initial=0.0) > max(rest, GROSS * np.max(wanted, initial=0.0)):
         what = f"velocities given to bodies violate it by {residual.max():.3g} m/s or rad/s"
         raise joint_fault(model, int(np.argmax(residual)), what)
     size = max(np.abs(x / scale).max(), np.abs(v / scale).max())
-    share = residual / (lengths_of_rows(blocks, length) * size)
-    return x, float(np.max(share, initial=0.0)), not given.all()
+    off = float(np.max(residual / lengths_of_rows(blocks, length), initial=0.0))
+    return x, 0.0 if off <= rest else off / size, not given.all()
