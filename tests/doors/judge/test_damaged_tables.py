@@ -66,8 +66,8 @@ def status(table: bytes, folder: Path) -> int:
 
 
 @pytest.mark.parametrize("name", OFF)
-def test_wrong_numbers_of_any_size_are_off_and_not_explained(name: str, tmp_path: Path, capsys) -> None:
-    """Also zeros are not explained, as by angles in degrees that were rounded."""
+def test_wrong_numbers_of_any_size_are_off_and_have_no_explanation(name: str, tmp_path: Path, capsys) -> None:
+    """The exact angle is 16 t rad; neither zeros, huge numbers nor the least numbers are a change of it."""
     assert status(OFF[name].encode(), tmp_path) == 1
     shown = capsys.readouterr().out
     (angle,) = (line for line in shown.splitlines() if "A.angle" in line)
@@ -77,7 +77,7 @@ def test_wrong_numbers_of_any_size_are_off_and_not_explained(name: str, tmp_path
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_damaged_table_is_refused_with_one_sentence_on_its_damage(name: str, tmp_path: Path, capsys) -> None:
-    """The one line on standard error is short, however long a cell is."""
+    """Standard error has one line of less than 500 characters, also for a cell of 200 000 digits."""
     table, says = REFUSED[name]
     assert status(table.encode(), tmp_path) == 2
     printed = capsys.readouterr()
@@ -86,7 +86,8 @@ def test_damaged_table_is_refused_with_one_sentence_on_its_damage(name: str, tmp
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_random_bytes_are_refused_with_one_sentence(seed: int, tmp_path: Path, capsys) -> None:
+def test_random_bytes_are_refused_with_one_sentence_on_the_file(seed: int, tmp_path: Path, capsys) -> None:
+    """3000 random bytes are no text: the command prints one line, which names run.csv, and returns 2."""
     assert status(np.random.default_rng(seed).bytes(3000), tmp_path) == 2
     printed = capsys.readouterr()
     assert not printed.out and printed.err.count("\n") == 1 and "run.csv: " in printed.err
@@ -110,18 +111,25 @@ def test_random_bytes_are_refused_with_one_sentence(seed: int, tmp_path: Path, c
 def test_exact_table_is_right_in_encodings_and_formats_of_other_programs(
     table: bytes, tmp_path: Path
 ) -> None:
-    """``rows("0", at=0)`` is the exact motion."""
+    """``rows("0", at=0)`` is the exact motion, the angle 16 t rad and the rate 16 rad/s; 0 means right."""
     assert status(table, tmp_path) == 0
 
 
-def test_columns_in_python_that_are_missing_of_another_length_or_not_finite_are_named() -> None:
-    times = np.array([0.0, 0.5])
-    for motion, says in (
-        ({"A.angle": times}, "no column time"),
-        ({"time": times, "b.angle": times}, "no column of the scene"),
-        ({"time": times, "A.angle": times[:1]}, "A.angle: must have one number for each time"),
-        ({"time": times, "A.angle": times * np.nan}, "A.angle: is not finite"),
-        ({"time": times[::-1], "A.angle": times}, "must increase"),
-    ):
-        with pytest.raises(SceneError, match=says):
-            crosscheck.judge_motion(spinning_rod(), motion)
+HALF = np.array([0.0, 0.5])  # s
+
+
+@pytest.mark.parametrize(
+    ("motion", "says"),
+    [
+        ({"A.angle": HALF}, "no column time"),
+        ({"time": HALF, "b.angle": HALF}, "no column of the scene"),
+        ({"time": HALF, "A.angle": HALF[:1]}, "A.angle: must have one number for each time"),
+        ({"time": HALF, "A.angle": HALF * np.nan}, "A.angle: is not finite"),
+        ({"time": HALF[::-1], "A.angle": HALF}, "must increase"),
+    ],
+    ids=["no times", "no known column", "too short", "not finite", "falling times"],
+)
+def test_function_judge_motion_refuses_faulty_columns_with_the_fault(motion: dict, says: str) -> None:
+    """The columns are arrays in Python instead of a file."""
+    with pytest.raises(SceneError, match=says):
+        crosscheck.judge_motion(spinning_rod(), motion)

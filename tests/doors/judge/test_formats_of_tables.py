@@ -54,8 +54,11 @@ def unit(values: np.ndarray, form: str) -> float:
 
 
 @seeds
-def test_an_exact_table_is_right_in_every_format(seed: int, tmp_path: Path) -> None:
-    """The bound exceeds a thousandth of the column's range only where the verdict states the rounding."""
+def test_an_exact_table_is_right_in_every_format_and_coarse_rounding_is_stated(
+    seed: int, tmp_path: Path
+) -> None:
+    """The table is part of a reference motion, in a random format. Where the error that the judge allows
+    exceeds a thousandth of a column's range, its verdict states to which unit the column is rounded."""
     _, scene, table, form = random_part(seed)
     found = crosscheck.judge_motion(scene, write_table(table, tmp_path / "run.csv", FORMATS[form]))
     assert found.is_right, (form, [c for c in found.columns if not c.is_right])
@@ -66,7 +69,8 @@ def test_an_exact_table_is_right_in_every_format(seed: int, tmp_path: Path) -> N
 
 @pytest.mark.parametrize("form", ["%.6f", "%.7f", "%.8f", "%.7g", "spreadsheet with 8 decimals"])
 def test_numbers_wrong_by_half_the_tolerance_are_right_after_rounding(form: str, tmp_path: Path) -> None:
-    """Half the tolerance and half a unit of the last digit are together more than either of them."""
+    """The judge must add both allowances: half its tolerance, 5e-9 rad, is put into each angle of the exact
+    motion, and writing with few digits adds up to half a unit of the last digit."""
     rng = np.random.default_rng(6)
     table = {n: exact("double_pendulum")[n].copy() for n in ("time", "A.angle", "B.angle")}
     for name in ("A.angle", "B.angle"):
@@ -79,7 +83,7 @@ def test_numbers_wrong_by_half_the_tolerance_are_right_after_rounding(form: str,
 def test_column_with_one_cell_that_is_ten_units_of_its_last_digit_wrong_is_off(
     seed: int, tmp_path: Path
 ) -> None:
-    """The error exceeds the tolerance, too."""
+    """One number of an exact table is changed by ten units of its last digit plus 100 tolerances."""
     rng, scene, table, form = random_part(seed)
     name = str(rng.choice([n for n in table if n != "time"]))
     size = 10 * unit(table[name], form) + 100 * TOLERANCE * max(1.0, np.abs(table[name]).max())
@@ -97,23 +101,29 @@ def test_column_with_one_cell_that_is_ten_units_of_its_last_digit_wrong_is_off(
         ["0,1e308", "0.1,1e308", "0.2,1e308", "0.3,1e308"],
         ["0.0,0.0", "0.1,1.0", "0.2,2.0", "0.3,3.0"],
     ],
+    ids=["jumps", "slow", "huge", "even"],
 )
-def test_invented_numbers_are_off(rows: list[str], tmp_path: Path) -> None:
-    """Cells such as 0 and 0.5 are not rounded to their few digits: tools leave trailing zeros away."""
+def test_angles_that_are_not_the_motion_are_off_though_they_have_few_digits(
+    rows: list[str], tmp_path: Path
+) -> None:
+    """The angle of the double pendulum falls from 0; cells such as 0.5 stand for themselves, not for numbers
+    rounded to one digit, because tools leave trailing zeros away."""
     path = tmp_path / "run.csv"
     path.write_text("\n".join(["time,A.angle", *rows]), encoding="utf-8")
     assert not crosscheck.judge_motion(double_pendulum(), path).is_right
 
 
-@pytest.mark.parametrize(("form", "says"), [("%.3f", "right, rounded to"), ("%.12g", "right")])
-def test_command_says_that_few_digits_are_rounded(form: str, says: str, tmp_path: Path, capsys) -> None:
-    """Three decimals of an angle below 0.5 rad are bounded by more than a thousandth of its range."""
+@pytest.mark.parametrize(("form", "verdict"), [("%.3f", "right, rounded to 2 digits"), ("%.12g", "right")])
+def test_command_states_the_rounding_of_an_exact_angle_with_three_decimals_alone(
+    form: str, verdict: str, tmp_path: Path, capsys
+) -> None:
+    """Half a unit of three decimals exceeds a thousandth of the range of this angle, less than 0.1 rad."""
     double_pendulum().save(tmp_path / "scene.toml")
     part = {n: exact("double_pendulum")[n][:12] for n in ("time", "A.angle")}
     path = write_table(part, tmp_path / "run.csv", FORMATS[form])
     assert main(["judge", str(tmp_path / "scene.toml"), str(path)]) == 0
     (row,) = [line for line in capsys.readouterr().out.splitlines() if "A.angle" in line]
-    assert says in row and ("rounded" in row) == ("rounded" in says), row
+    assert [cell.strip() for cell in row.split("│") if "right" in cell] == [verdict], row
 
 
 def test_column_of_zeros_is_too_coarse_to_be_right(tmp_path: Path) -> None:
@@ -129,7 +139,8 @@ def test_column_of_zeros_is_too_coarse_to_be_right(tmp_path: Path) -> None:
     ["%.6g", *(pytest.param(f, marks=pytest.mark.slow) for f in ("%.3f", "%.4g", "single precision"))],
 )
 def test_times_that_are_rounded_are_compared_within_their_rounding(form: str, tmp_path: Path) -> None:
-    """Times that are multiples of 1/71 s are written with few digits; one cell that is off stays off."""
+    """Exact states at multiples of 1/71 s are right though their times are written with few digits. With one
+    angle wrong by 0.05 rad, more than rounded times explain, the table is off."""
     scene = double_pendulum()
     table = crosscheck.reference_table(scene, np.arange(26) / 71)
     part = {n: table[n] for n in ("time", "lower.position.x", "lower.velocity.y", "A.angle", "B.rate")}

@@ -92,8 +92,9 @@ def test_torque_of_a_driver_is_the_reduced_inertia_times_the_acceleration(
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 20))])
-def test_work_of_driver_and_dampers_is_the_change_of_the_energy(seed: int) -> None:
-    """The spline through 401 samples of the power is exact to 1e-8; a damper loses c times rate squared."""
+def test_change_of_the_energy_is_the_drivers_work_less_the_dampers_losses(seed: int) -> None:
+    """E(t) - E(0) = ∫ (P - Σ c v²) dt. The spline through 401 samples of the power is exact to 1e-8 of the
+    largest energy; the limit has a margin of ten."""
     scene, times = machine(seed), np.linspace(0.0, 1.0, 401)
     table = crosscheck.reference_table(scene, times)
     spring, bar = scene.load
@@ -105,7 +106,8 @@ def test_work_of_driver_and_dampers_is_the_change_of_the_energy(seed: int) -> No
     assert np.abs(gained - work).max() <= 1e-7 * np.abs(table["energy"]).max()
 
 
-def test_force_of_a_spring_is_stiffness_times_stretch_and_damping_times_its_rate() -> None:
+def test_force_of_a_spring_is_stiffness_times_stretch_plus_damping_times_its_rate() -> None:
+    """F = k (l - 0.5 m) + c l' by the columns of the length l and its rate."""
     scene = machine(0)
     table, bar = crosscheck.reference_table(scene, np.linspace(0.0, 1.0, 21)), scene.load[1]
     pull = bar.stiffness * (table["load(1).length"] - 0.5) + bar.damping * table["load(1).length_rate"]
@@ -113,7 +115,8 @@ def test_force_of_a_spring_is_stiffness_times_stretch_and_damping_times_its_rate
 
 
 def test_torque_that_lacks_the_armature_is_off_and_the_armature_is_named() -> None:
-    """A constant torque may as well lack a factor J / (J + I) or an offset -I φ''."""
+    """The torque is J φ'' instead of (J + I) φ''. It is constant, so that a factor J / (J + I) and an offset
+    -I φ'' explain it as well: the explanation joins the three by "or"."""
     scene, times = driven(armature=ARMATURE), np.linspace(0.0, 1.0, 21)
     table = crosscheck.reference_table(scene, times)
     wrong = {"time": times, "driver(A).torque": 0 * times + INERTIA * RATE, "A.angle": table["A.angle"]}
@@ -161,7 +164,8 @@ def test_angles_of_a_reference_count_full_turns_whatever_samples_are_asked_for(t
     assert table["energy"] == pytest.approx(50.0, abs=1e-9)
 
 
-def test_angles_without_their_full_turns_are_off_and_the_cause_is_named() -> None:
+def test_angles_without_their_full_turns_are_explained_as_such() -> None:
+    """φ = 10 sin t rad is right; wrapped to -π … π it is off."""
     times = np.array([1.0, 2.0, 5.0, 8.0])
     angle = 10 * np.sin(times)
     assert crosscheck.judge_motion(wound_disc(), {"time": times, "A.angle": angle}).is_right
@@ -170,16 +174,19 @@ def test_angles_without_their_full_turns_are_off_and_the_cause_is_named() -> Non
     assert cause.sentence == "A.angle: full turns are not counted (angles between -π and π)"
 
 
-@pytest.mark.parametrize(
-    ("driven_joints", "length"), [("A", 1e6), ("AD", 1e-6)], ids=["determined", "shared"]
-)
-def test_driver_torque_of_a_closed_loop_grows_with_the_square_of_its_size(driven_joints, length):
-    """Two drivers of the loop's one freedom have no determined torque, NaN, at any size."""
+def torque_of_a(length: float, driven_joints: str) -> float:
+    """Return the torque of the driver of A (N m) on a parallelogram with drivers at the named joints."""
     drivers = [Driver(joint=name, polynomial=(0.0, 1.0, 2.0)) for name in driven_joints]
-    scene = parallelogram(0.6, 0.8).with_(driver=drivers)
-    expected, found = (
-        crosscheck.reference_table(each, [0.01])["driver(A).torque"]
-        for each in (scene, in_other_units(scene, length, 1.0))
-    )
-    assert np.isnan(expected).all() == (driven_joints == "AD")
-    assert np.allclose(np.array(found) / length**2, expected, rtol=1e-9, equal_nan=True)
+    scene = in_other_units(parallelogram(0.6, 0.8).with_(driver=drivers), length, 1.0)
+    return float(crosscheck.reference_table(scene, [0.01])["driver(A).torque"][0])
+
+
+def test_driver_torque_of_a_closed_loop_grows_with_the_square_of_its_size():
+    """N m = kg m²/s²: in units of length 1e6 times smaller, the torque's number is 1e12 times larger."""
+    assert torque_of_a(1e6, "A") == pytest.approx(1e12 * torque_of_a(1.0, "A"), rel=1e-9)
+
+
+@pytest.mark.parametrize("length", [1e-6, 1.0])
+def test_torque_of_one_of_two_drivers_of_one_freedom_is_not_a_number(length):
+    """Drivers at A and D move the parallelogram's one freedom: only the sum of torques is determined."""
+    assert np.isnan(torque_of_a(length, "AD"))

@@ -28,25 +28,29 @@ def two_hinges() -> Scene:
     return rod.with_(joint=[rod.joint[0], rod.joint[0].model_copy(update={"name": "B"})])
 
 
-def test_closed_forms_of_reactions_are_right():
+def test_table_of_the_closed_form_of_reactions_is_right_in_each_column():
+    """The hinge pulls the rod to the axis with m ω² r = 128 N and has no moment: five columns."""
     found = crosscheck.judge_motion(spinning_rod(), pulls())
     assert found.is_right and len(found.columns) == 5 and not found.left
 
 
 @pytest.mark.parametrize(("scale", "says"), [(-1.0, "factor -1"), (1.01, "factor of 1.01")])
-def test_wrong_reactions_are_off_and_their_factor_is_named(scale, says):
+def test_reactions_times_a_factor_are_off_and_the_factor_is_named(scale, says):
+    """The closed form times -1 or 1.01; zeros times a factor remain right."""
     found = crosscheck.judge_motion(spinning_rod(), pulls(scale))
     assert {c.name for c in found.columns if not c.is_right} == {"A.force.x", "A.force.y"}
     assert says in found.explanations[0].sentence
 
 
-def test_reactions_that_redundant_hinges_share_are_not_judged():
+def test_reactions_that_redundant_hinges_share_are_left_out_and_the_angle_is_judged():
+    """Two hinges on one axis share the force of 128 N in parts that the constraints don't determine."""
     found = crosscheck.judge_motion(two_hinges(), {**pulls(), "A.angle": SPEED * TIMES})
     assert found.is_right and [c.name for c in found.columns] == ["A.angle"]
     assert set(found.left) == set(pulls()) - {"time"}
 
 
-def test_a_table_of_reactions_is_read_with_its_units(tmp_path, capsys):
+def test_force_in_kilonewtons_is_right_by_the_unit_in_its_header(tmp_path, capsys):
+    """The closed form over 1000, with the header ``A.force.x [kN]``."""
     spinning_rod().save(tmp_path / "rod.toml")
     table = {n.replace("force.x", "force.x [kN]"): c for n, c in pulls().items()}
     table["A.force.x [kN]"] = table["A.force.x [kN]"] / 1e3

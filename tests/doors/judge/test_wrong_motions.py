@@ -79,13 +79,15 @@ MAKERS = [double_hinge, flying, MOTIONS["gears with armature"], MOTIONS["planar_
 
 @pytest.mark.parametrize("make", MAKERS)
 def test_true_motion_has_no_error_and_no_violation(make):
+    """The run is the truth at its own times: errors and violations are rounding, 5000 units at most."""
     found = measured(make)
     for name in ("error", "velocity_error", "violation_position", "violation_velocity"):
         assert found[name] <= 1e-12, name
     assert found["scd"] > 12 and found["error_bound"] <= 1e-11
 
 
-def test_measures_are_all_metrics_the_truth_s_bound_and_the_time_up_to_which_it_is_known():
+def test_measures_of_a_run_are_each_metric_and_bound_and_end_of_the_truth():
+    """The keys are METRICS, which `crosscheck list metrics` prints, and two of the truth."""
     assert measured(flying).keys() == {*METRICS, "error_bound", "error_until"}
 
 
@@ -145,7 +147,8 @@ def largest_energy(scene: Scene, run: Trajectory) -> float:
 
 @pytest.mark.parametrize("share", [1e-6, 0.03])
 def test_velocities_too_fast_by_a_share_have_that_error_and_kinetic_energies_that_drift(share):
-    """Joints allow the faster motion; ((1 + s)² - 1) T of the largest energy is too much."""
+    """Joints allow velocities (1 + s) v. The kinetic energy T is too large by ((1 + s)² - 1) T, relative to
+    the largest energy."""
     scene, _, exact = exact_of(double_hinge)
     faster = {name: (1 + share) * getattr(exact, name) for name in ("velocity", "angular_velocity")}
     found = measured(double_hinge, **faster)
@@ -212,6 +215,7 @@ def test_momentum_drift_of_a_pushed_body_is_the_change_of_its_momentum():
 @pytest.mark.parametrize("make", [double_hinge, MOTIONS["planar_slider_crank_gravity"]])
 @pytest.mark.parametrize("share", [0.01, 0.2])
 def test_error_and_imbalance_of_reactions_too_large_by_a_share_are_that_share(make, share):
+    """True reactions have the error 0 and balance the accelerations, to rounding."""
     scene, truth, exact = exact_of(make)
     true = with_exact_reactions(scene, exact)
     larger = replace(true, reactions={name: (1 + share) * w for name, w in true.reactions.items()})
@@ -222,7 +226,7 @@ def test_error_and_imbalance_of_reactions_too_large_by_a_share_are_that_share(ma
 
 
 def test_reaction_a_million_times_too_large_is_named_with_its_engine_and_joint():
-    """A singular matrix gives such reactions."""
+    """An engine that solves with a singular matrix gives such reactions; true ones are not named."""
     scene, _, exact = exact_of(double_hinge)
     true = with_exact_reactions(scene, exact)
     wild = replace(true, engine="other", reactions={**true.reactions, "B": 1e6 * true.reactions["B"]})
@@ -252,7 +256,8 @@ START = {
 @pytest.mark.parametrize("make", [double_hinge, MOTIONS["planet with armatures"]])
 @pytest.mark.parametrize("field", START)
 def test_gate_names_the_quantity_that_differs_and_its_size(make, field):
-    """One array is changed at one of two samples; twice the fault has twice the size."""
+    """A vector of the length in START is added to one array of the true run, at the start or the next sample.
+    The gate names its field; twice the vector has twice the size, and positions count in scene lengths."""
     scene, run = make(), short_run(make)
     name, sample, size, scale = START[field]
     assert gate(scene, [run, replace(run, engine="other")]) is None
@@ -276,7 +281,7 @@ def test_gate_names_the_quantity_that_differs_and_its_size(make, field):
 
 @pytest.mark.parametrize("change", ["mass", "inertia"])
 def test_gate_names_the_change_of_velocity_of_a_body_with_another_mass_or_inertia(change):
-    """A tenth more; the gate compares two times shortly after the start."""
+    """The second block has a tenth more of it; the difference is more than ten times what the gate allows."""
     scene = double_hinge()
     body = scene.body[1]
     parts = body.model_dump()
@@ -290,8 +295,8 @@ def test_gate_names_the_change_of_velocity_of_a_body_with_another_mass_or_inerti
 
 @pytest.mark.parametrize("sample", [0, 4, 8])
 def test_accelerations_that_are_wrong_from_a_sample_on_are_named_with_their_time(sample):
-    """A few of the samples are compared, the last one among them: the time may be two samples late. It is
-    printed with few digits."""
+    """50 m/s² are added from a sample on. Some of the nine samples are compared, the last one among them, so
+    the printed time may be up to two samples late. Its three digits round by less than 1 %."""
     scene, _, exact = exact_of(double_hinge)
     assert along(scene, exact) is None
     off = np.where(np.arange(SAMPLES) >= sample, 50.0, 0.0)[:, None, None] * AXIS  # m/s²
@@ -299,7 +304,7 @@ def test_accelerations_that_are_wrong_from_a_sample_on_are_named_with_their_time
     assert found is not None and found.engines == ("the judge", "other")
     time = float(found.field.removeprefix("acceleration at t = ").removesuffix(" s"))
     assert 0.99 * exact.times[sample] <= time <= 1.01 * exact.times[min(sample + 2, SAMPLES - 1)]
-    assert found.by > 0.1
+    assert found.by > 100 * found.allowed
 
 
 # --- digits -----------------------------------------------------------------------------------------------
@@ -310,7 +315,8 @@ def neighbouring_samples() -> Trajectory:
 
 @pytest.mark.parametrize("size", [1e-9, 1e-6])
 def test_noise_of_positions_is_measured_within_a_factor_of_six(size):
-    """Of seven neighbouring samples a smooth motion leaves no sixth difference; noise (m) has a spread."""
+    """A smooth motion has no sixth difference of neighbouring samples: rounding is found. Normal noise of a
+    standard deviation (m) is found to a factor of six: twelve samples show its spread no better."""
     scene, run = double_hinge(), neighbouring_samples()
     assert grain(scene, run)[0] < 1e-13
     noise = size * np.random.default_rng(3).standard_normal(run.position.shape)
@@ -318,7 +324,8 @@ def test_noise_of_positions_is_measured_within_a_factor_of_six(size):
     assert of == "positions" and size / 6 < found * scene_length(scene) < 6 * size
 
 
-def test_velocities_in_single_precision_are_named():
+def test_velocities_in_single_precision_are_named_and_no_quantity_in_double_precision():
+    """Velocities are rounded to numpy's float32; the true motion is in doubles."""
     scene, run = double_hinge(), neighbouring_samples()
     assert not single_precision(scene, run)
     single = replace(run, velocity=run.velocity.astype(np.float32).astype(float))

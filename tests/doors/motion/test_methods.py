@@ -34,15 +34,18 @@ def errors(name: str, method: str, rtol: float = RTOL) -> tuple[float, float, mb
 
 
 def limit(formulation: str) -> float:
-    """Return the largest error of a motion at ``RTOL``, a fifth of the tolerance if nothing is iterated."""
+    """Return the largest error of poses at ``RTOL``: a fifth of the tolerance if nothing is iterated.
+
+    Measured errors are about a fiftieth of it. Rates have three times as much.
+    """
     return (1.0 if formulation in ITERATED else 0.2) * RTOL
 
 
 @pytest.mark.parametrize("stabilisation", STABILISATIONS)
 @pytest.mark.parametrize("formulation", GENERAL)
 def test_every_formulation_has_the_judges_states_with_every_stabilisation(formulation, stabilisation):
-    """Errors are within `limit`. Runs take 10 steps, or 19 if accelerations are iterated; a stabilisation
-    that disturbs the motion would need many more than 30."""
+    """Errors against the judge are within `limit`. Runs take 10 steps, or 19 if accelerations are iterated;
+    a stabilisation that disturbs the motion would need many more than 30."""
     pose, rate, run = errors("arm with universal", f"{formulation}+{stabilisation}")
     assert pose < limit(formulation)
     assert rate < 3 * limit(formulation)
@@ -52,20 +55,27 @@ def test_every_formulation_has_the_judges_states_with_every_stabilisation(formul
 @pytest.mark.parametrize("name", INDEPENDENT)
 @pytest.mark.parametrize("formulation", GENERAL)
 def test_every_formulation_has_the_judges_states_where_rows_are_independent(formulation, name):
+    """Mechanisms with springs, gears, drivers and loops whose constraint rows are independent."""
     pose, rate, _ = errors(name, f"{formulation}+projection")
     assert pose < limit(formulation)
     assert rate < 3 * limit(formulation)
 
 
 @pytest.mark.parametrize("name", REDUNDANT)
-@pytest.mark.parametrize("formulation", GENERAL)
-def test_redundant_rows_are_solved_or_reported_as_the_formulation_claims(formulation, name):
+@pytest.mark.parametrize("formulation", [n for n in GENERAL if FORMULATIONS[n].handles_redundancy])
+def test_formulation_that_claims_it_has_the_judges_states_with_redundant_rows(formulation, name):
+    """Four hinges on parallel axes, and two hinges of one axis, have redundant constraint rows."""
+    pose, rate, _ = errors(name, f"{formulation}+projection")
+    assert pose < limit(formulation)
+    assert rate < 3 * limit(formulation)
+
+
+@pytest.mark.parametrize("name", REDUNDANT)
+@pytest.mark.parametrize("formulation", [n for n in GENERAL if not FORMULATIONS[n].handles_redundancy])
+def test_formulation_without_the_claim_ends_at_the_start_with_the_number_of_redundant_rows(formulation, name):
+    """The leading matrix is singular: the run has no sample, and the message says which rows are the
+    cause."""
     scene = MOTIONS[name]()
-    if FORMULATIONS[formulation].handles_redundancy:
-        pose, rate, _ = errors(name, f"{formulation}+projection")
-        assert pose < limit(formulation)
-        assert rate < 3 * limit(formulation)
-        return
     run = mbref.simulate(scene, f"{formulation}+projection", times=times_of(scene))
     redundant = mbref.counts(scene).redundant
     assert run.outcome is Outcome.SINGULAR_MATRIX
@@ -74,9 +84,14 @@ def test_redundant_rows_are_solved_or_reported_as_the_formulation_claims(formula
 
 
 @pytest.mark.parametrize("stabilisation", ["none", "projection"])
-def test_gram_schmidt_as_printed_solves_mechanisms_only_if_drivers_prescribe_all_freedoms(stabilisation):
+def test_gram_schmidt_as_printed_has_the_judges_states_of_a_fully_driven_mechanism(stabilisation):
+    """Drivers prescribe all freedoms of the slider-crank."""
     pose, _, _ = errors("spatial_slider_crank_driven", f"mpi-gs-literal+{stabilisation}")
     assert pose < limit("mpi-gs-literal")
+
+
+def test_gram_schmidt_as_printed_reports_a_singular_matrix_for_a_free_mechanism():
+    """The printed algorithm needs as many independent rows as coordinates."""
     free = MOTIONS["four hinges"]()
     assert mbref.simulate(free, "mpi-gs-literal+none", times=[0.1]).outcome is Outcome.SINGULAR_MATRIX
 
@@ -84,55 +99,66 @@ def test_gram_schmidt_as_printed_solves_mechanisms_only_if_drivers_prescribe_all
 @pytest.mark.parametrize("stabilisation", STABILISATIONS)
 @pytest.mark.parametrize("name", ["arm with universal", "pendulum with moment that is switched"])
 def test_rk4_has_order_four(name, stabilisation):
-    """Halved steps have a sixteenth of the error, also on both sides of a switch."""
+    """Halved steps have 2⁻⁴ of the error against the judge, also on both sides of a switch. Errors are no
+    pure powers of such steps: orders from 3.5 to 5.0 are accepted."""
     coarse, _, _ = errors(name, f"lm2+{stabilisation}/rk4[step=4e-3]")
     fine, _, _ = errors(name, f"lm2+{stabilisation}/rk4[step=2e-3]")
     assert 3.5 < np.log2(coarse / fine) < 5.0
 
 
 @pytest.mark.parametrize("stabilisation", STABILISATIONS)
-@pytest.mark.parametrize("options", ["", "[max_order=4]"])
-def test_adams_meets_its_tolerance_with_more_steps_at_a_lower_order(options, stabilisation):
-    """A tenth of the tolerance or more is used: 47 to 58 steps, and 115 to 145 at the order four."""
+@pytest.mark.parametrize(
+    ("options", "fewest", "most"), [("", 30, 70), ("[max_order=4]", 100, 180)], ids=["order 12", "order 4"]
+)
+def test_adams_meets_its_tolerance_and_takes_twice_the_steps_at_order_four(
+    options, fewest, most, stabilisation
+):
+    """The error against the judge is below rtol = 1e-9, of rates below three times as much. Measured were 47
+    to 58 steps, and 115 to 145 with orders up to four."""
     pose, rate, run = errors("arm with universal", f"mpi-qr+{stabilisation}/adams{options}", rtol=1e-9)
-    assert 1e-12 < pose < 1e-9
+    assert pose < 1e-9
     assert rate < 3e-9
-    assert run.cost.steps < 70 if not options else 100 < run.cost.steps < 180
+    assert fewest < run.cost.steps < most
 
 
+@pytest.mark.parametrize("rtol", [1e-5, 1e-8, 1e-11])
 @pytest.mark.parametrize("method", ["lm2+projection", "lm2+projection/adams", "taylor"])
-def test_error_of_poses_is_at_most_ten_times_the_tolerance(method):
-    for rtol in (1e-5, 1e-8, 1e-11):
-        pose, _, _ = errors("pendulum with spring with damping", method, rtol)
-        assert pose < 10 * rtol
+def test_error_of_poses_is_at_most_ten_times_the_tolerance(method, rtol):
+    """The error against the judge of a damped pendulum; local errors of its few steps add up."""
+    pose, _, _ = errors("pendulum with spring with damping", method, rtol)
+    assert pose < 10 * rtol
 
 
-def test_feedback_bounds_the_drift_of_constraints():
-    """Violations grow in steps of 10 ms without feedback; gains of 5 1/s make them decay within a second."""
+def test_baumgartes_feedback_keeps_constraint_violations_small_that_grow_without_it():
+    """Fixed steps of 10 ms: without feedback the violation more than doubles from 1 s to 2 s. With gains
+    α = β = 5 1/s it is less than half of that at 1 s, and less than a twentieth at 2 s."""
     scene = MOTIONS["loop with inline"]().with_(duration=2.0)
-    free, fed = (
+    without, fed_back = (
         mbref.simulate(scene, f"lm2+{name}/rk4[step=1e-2]", times=[1.0, 2.0]).violation.position
         for name in ("none", "baumgarte[alpha=5,beta=5]")
     )
-    assert free[1] > 2 * free[0] > 1e-5
-    assert fed.max() < 0.5 * free[0]
-    assert fed[1] < 0.05 * free[1]
+    assert without[1] > 2 * without[0] > 0.0
+    assert fed_back[0] < without[0] / 2
+    assert fed_back[1] < without[1] / 20
 
 
 @pytest.mark.parametrize("name", ["gears with armature", "arm with universal"])
 def test_projection_keeps_joints_closed_to_rounding(name):
-    for stabilisation, most in (("none", 1e-9), ("projection", 1e-13)):
-        _, _, run = errors(name, f"lm2+{stabilisation}/rk4[step=2e-3]")
-        assert run.violation.position.max() < most
-        assert run.violation.velocity.max() < 100 * most
+    """Violations over the mechanism's length, in 2 ms steps of order four; of velocities, 100 times as
+    much."""
+    rounding = 1e-13  # 500 units
+    _, _, run = errors(name, "lm2+projection/rk4[step=2e-3]")
+    assert run.violation.position.max() < rounding
+    assert run.violation.velocity.max() < 100 * rounding
 
 
-def test_body_without_mass_is_moved_or_refused_by_name_as_the_formulation_claims():
-    motion = "massless link between slides"
-    scene = MOTIONS[motion]()
-    for name in GENERAL:
-        if FORMULATIONS[name].handles_singular_mass:
-            assert errors(motion, f"{name}+projection")[0] < limit(name)
-        else:
-            run = mbref.simulate(scene, f"{name}+projection", times=times_of(scene))
-            assert run.outcome is not Outcome.COMPLETED and "body 'bridge' lacks mass" in run.message
+@pytest.mark.parametrize("formulation", [n for n in GENERAL if FORMULATIONS[n].handles_singular_mass])
+def test_formulation_that_claims_it_has_the_judges_states_with_a_body_without_mass(formulation):
+    assert errors("massless link between slides", f"{formulation}+projection")[0] < limit(formulation)
+
+
+@pytest.mark.parametrize("formulation", [n for n in GENERAL if not FORMULATIONS[n].handles_singular_mass])
+def test_formulation_without_the_claim_reports_a_singular_matrix_and_the_body_without_mass(formulation):
+    scene = MOTIONS["massless link between slides"]()
+    run = mbref.simulate(scene, f"{formulation}+projection", times=times_of(scene))
+    assert run.outcome is Outcome.SINGULAR_MATRIX and "body 'bridge' lacks mass" in run.message

@@ -21,6 +21,7 @@ def numbers(motion):
 
 @pytest.mark.parametrize("name", ["spatial_slider_crank_gravity", "four_bar_gravity"])
 def test_second_run_of_a_scene_is_equal_to_the_bit(name):
+    """So is the run of a copy without anything that the first run kept with the scene."""
     scene = find_scene(name)
     first, again = (numbers(simulate(scene, "taylor", TIMES)) for _ in range(2))
     fresh = numbers(simulate(pickle.loads(pickle.dumps(scene)), "taylor", TIMES))
@@ -29,7 +30,8 @@ def test_second_run_of_a_scene_is_equal_to_the_bit(name):
         assert np.array_equal(one, new)
 
 
-def test_methods_in_turns_on_one_scene_do_not_change_each_other():
+def test_methods_that_run_by_turns_on_one_scene_do_not_change_each_others_positions():
+    """Alone, each method runs on a scene of its own; positions are equal to the bit."""
     scene = find_scene("spatial_slider_crank_gravity")
     alone = [simulate(find_scene(scene.name), method, TIMES).position for method in METHODS]
     turns = [[simulate(scene, method, TIMES).position for method in METHODS] for _ in range(2)]
@@ -40,6 +42,8 @@ def test_methods_in_turns_on_one_scene_do_not_change_each_other():
 
 @pytest.mark.parametrize("copy", ["with_", "model_copy"])
 def test_changed_copy_moves_by_its_own_numbers(copy):
+    """The copy of a scene that ran has three times the mass. It moves otherwise than the scene, and to the
+    bit as a changed scene that never ran."""
     scene = find_scene("planar_slider_crank_gravity")
     before = simulate(scene, times=TIMES).position
     heavier = [body.model_copy(update={"mass": 3.0 * body.mass}) for body in scene.body[:1]]
@@ -50,7 +54,8 @@ def test_changed_copy_moves_by_its_own_numbers(copy):
     assert np.array_equal(found, simulate(find_scene(scene.name).with_(**change), times=TIMES).position)
 
 
-def test_a_scene_that_ran_alone_is_equal_in_an_ensemble():
+def test_positions_of_a_scene_in_an_ensemble_are_equal_to_its_run_alone():
+    """Four masses of the rod run alone, one is diagnosed, and then all run together: equal to the bit."""
     scene = find_scene("planar_slider_crank_gravity")
     variants = [scene, *(scene.with_("body[rod].mass", mass) for mass in (0.5, 0.6, 0.7))]
     alone = [simulate(each, "taylor", TIMES).position for each in variants]
