@@ -169,13 +169,6 @@ def test_estimate_at_the_smallest_tolerance_shows_the_growth_of_rounding_errors(
     assert found.error[-1] > 20 * found.error[1] > 0
 
 
-def test_estimate_of_a_prescribed_motion_is_of_the_size_of_rounding():
-    """A driver prescribes the whole motion, so that no error of integration is left: rounding, 1e-16, is
-    magnified at four singular positions, and stays far below rtol, 1e-9."""
-    found = with_error_estimate(simulate("four_bar", duration=0.1)).error_estimate
-    assert found.exceeds_rtol_from is None and 0 < found.largest < 1e-11
-
-
 @pytest.mark.parametrize(
     ("name", "duration"),
     [("planar_slider_crank_equal", 0.3), ("four_bar_straight", 0.1)],

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crosscheck.judge.energy import kinetic_energy, potential_energy
 from mbref import Limits, Motion, Scene, SceneError, Trajectory, find_scene, simulate
 from mbref.motions.drawing.plot import grouped
 from mbref.scene import Body
@@ -29,14 +28,6 @@ def driven() -> Motion:
 @pytest.fixture(scope="module")
 def crank() -> Motion:
     return simulate("planar_slider_crank", times=TIMES)
-
-
-@pytest.fixture(scope="module")
-def door() -> Motion:
-    """A door on a spring and a torsion spring, without their dampers, for 1 s; about 5 J are exchanged."""
-    scene = Scene.from_file(ROOT / "examples" / "door_closer.toml")
-    loads = tuple(load.model_copy(update={"damping": 0.0}) for load in scene.load)
-    return simulate(scene.with_(load=loads), times=np.linspace(0.0, 1.0, 6), limits=Limits(rtol=1e-11))
 
 
 def test_angle_of_a_driven_joint_is_counted_over_full_turns(driven):
@@ -77,20 +68,6 @@ def test_unknown_body_or_joint_is_refused_with_the_known_ones(crank):
         crank["lid"]
     with pytest.raises(KeyError, match="no joint 'Z'; joints: A, B"):
         crank.joint("Z")
-
-
-@pytest.mark.parametrize("name", ["crank", "door"])
-def test_kinetic_energy_and_energy_of_springs_are_the_judge_s(name, request):
-    motion = request.getfixturevalue(name)
-    scene = motion.mechanism
-    scene = scene.with_(load=[load for load in scene.load if load.type == "spring"])
-    of_springs = Motion.of(scene, motion).potential_energy
-    rates = motion.velocity, motion.angular_velocity
-    assert np.allclose(
-        motion.kinetic_energy, kinetic_energy(scene, motion.position, motion.orientation, *rates), rtol=1e-12
-    )
-    judged = potential_energy(scene, motion.position, motion.orientation)
-    assert np.allclose(of_springs, judged, rtol=1e-12)
 
 
 def test_energy_of_a_tumbling_body_is_that_of_its_principal_axes():

@@ -4,16 +4,7 @@ import numpy as np
 import pytest
 
 from mbref.method import Method, MethodError
-from mbref.scene import (
-    Body,
-    Driver,
-    Revolute,
-    Scene,
-    SceneError,
-    Sine,
-    TorsionSpring,
-    Translational,
-)
+from mbref.scene import Body, Driver, Revolute, Scene, SceneError, Sine, TorsionSpring, Translational
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
 

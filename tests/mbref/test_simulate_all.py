@@ -80,44 +80,27 @@ def test_variants_of_masses_and_gravity_together_equal_single_runs(name):
     assert len({run.position.tobytes() for run in runs}) == 12, "the variants are to differ"
 
 
-def test_variants_of_a_driven_scene_s_lengths_together_equal_single_runs():
-    scenes = list(variants(DRIVEN, [Variation("joint[B].anchor[0]", 0.1, 1e-3, normal=True)], 12))
-    assert not compared(scenes).differing
-    assert in_batches(scenes) == len(scenes) - 1, "roundings of zero in Φ and γ decide nothing"
+PUSH = Force(body="rod", point=(0.4, 0.1, 0.0), force=(1.0, 2.0, 0.0))
+PLACES = [
+    (SCENES["planar_slider_crank"](), "joint[B].anchor[0]"),
+    (DRIVEN, "joint[B].anchor[0]"),
+    (SCENES["four_bar_gravity"](), "body[coupler].position[0]"),
+    (SCENES["planar_slider_crank_gravity"](), "joint[C].anchor[0]"),
+    (SCENES["planar_slider_crank_gravity"]().with_(load=(PUSH,)), "load[0].point[0]"),
+    (gear_pair(), "coupling[0].ratio"),
+]
 
 
 @pytest.mark.parametrize(
-    ("name", "path"),
-    [
-        ("planar_slider_crank", "joint[B].anchor[0]"),  # a moment
-        ("spatial_slider_crank_driven", "joint[B].anchor[0]"),
-        ("four_bar_gravity", "body[coupler].position[0]"),
-        ("planar_slider_crank_gravity", "joint[C].anchor[0]"),
-    ],
+    ("scene", "path"), [pytest.param(*case, id=f"{case[0].name} {case[1]}") for case in PLACES]
 )
-def test_variants_of_places_together_equal_single_runs(name, path):
-    """Seven of eight variants are in a batch with the first one, though each has anchors or centres of its
-    own."""
-    scene = SCENES[name]()
+def test_variants_of_a_place_or_ratio_together_equal_single_runs(scene, path):
+    """Seven of eight variants are in a batch with the first one, though each has a number of its own
+    there."""
     mean = number_at(scene, path)
     scenes = list(variants(scene, [Variation(path, mean, 1e-5 * abs(mean), normal=True)], 8))
     assert not compared(scenes, np.linspace(0.0, 0.01, 3), method="taylor").differing
     assert in_batches(scenes, np.linspace(0.0, 0.01, 3), method="taylor") == len(scenes) - 1
-
-
-def test_variants_of_a_force_s_point_together_equal_single_runs():
-    force = Force(body="rod", point=(0.4, 0.1, 0.0), force=(1.0, 2.0, 0.0))
-    scene = SCENES["planar_slider_crank_gravity"]().with_(load=(force,))
-    scenes = list(variants(scene, [Variation("load[0].point[0]", 0.3, 0.5)], 8))
-    assert not compared(scenes, method="taylor").differing
-    assert in_batches(scenes, method="taylor") == len(scenes) - 1
-
-
-def test_variants_of_a_coupling_s_ratio_together_equal_single_runs():
-    varied = [Variation("coupling[0].ratio", -0.6, -0.4), Variation("joint[B].anchor[0]", 0.39, 0.41)]
-    scenes = list(variants(gear_pair(), varied, 8))
-    assert not compared(scenes, method="taylor").differing
-    assert in_batches(scenes, method="taylor") == len(scenes) - 1
 
 
 def test_variants_with_and_without_crossings_together_equal_single_runs():

@@ -18,21 +18,25 @@ from mbref.scenes.links import about_z, link
 from mbref.scenes.planar_slider_crank import planar_slider_crank_heavy, slider_crank
 from mbref.simulation.simulate import Limits, simulate
 
-RHOMBI = {"four": (four_bar, four_bar_gravity), "five": (five_bar, five_bar_gravity)}
+DRIVEN = {"four": four_bar, "five": five_bar}
+SWINGING = {"four": four_bar_gravity, "five": five_bar_gravity}  # released from rest at an angle (rad)
+RTOL = 1e-9  # the default of runs
 
 
-def error_of(scene: Scene, end: float, method: str = "taylor", **limits: object) -> float:
-    """Return the error of a completed run against the closed form, relative to the scene's length."""
-    run = simulate(scene, method, np.linspace(0.0, end, 9), Limits(**limits))
+def error_of(scene: Scene, end: float, **limits: object) -> float:
+    """Return the error of a completed run against the judge's closed form, relative to the scene's length."""
+    run = simulate(scene, "taylor", np.linspace(0.0, end, 9), Limits(**limits))
     assert run.outcome.label == "COMPLETED", f"{run.outcome.label}: {run.message}"
     return float(measure(scene, run, closed_form(scene))["error"])
 
 
-@pytest.mark.parametrize(("rung", "allowed"), [("mass_ratio[1e+09]", 1e-8), ("mass_ratio[1e+12]", 5e-7)])
+@pytest.mark.parametrize(
+    ("rung", "allowed"), [("mass_ratio[1e+09]", 10 * RTOL), ("mass_ratio[1e+12]", 500 * RTOL)]
+)
 def test_light_crank_turns_through_dead_centres_of_a_heavy_slider(rung, allowed):
-    """At a dead centre rounding is magnified by the ratio of masses, 1e9 or 1e12; the closed form is met."""
+    """At a dead centre rounding is magnified by the ratio of masses, 1e9 or 1e12."""
     scene = next(scene for scene in stability.scenes() if scene.name == rung)
-    assert error_of(scene, scene.duration, "taylor") < allowed
+    assert error_of(scene, scene.duration) < allowed
 
 
 def door(tilt: float, seed: int) -> Scene:
@@ -66,7 +70,8 @@ def test_door_that_tilted_hinges_hold_stays_at_its_place(method, tilt):
 @pytest.mark.parametrize("seed", [0, 1, 2])
 @pytest.mark.parametrize("tilt", [1e-7, 1e-8, 1e-9, 3e-10])
 def test_door_on_slightly_tilted_hinges_is_held_or_its_run_is_undecided(tilt, seed):
-    """Below 1e-8 rad rounding may turn a held door by the rounding unit over the tilt."""
+    """Rounding may turn a held door by the rounding unit over the tilt (rad), and move it by about 1e-12 m at
+    any tilt. Below 1e-8 rad a run may be UNDECIDED at its start instead."""
     scene = door(tilt, seed)
     run = simulate(scene, "taylor", [0.1, 0.2])
     if tilt < 1e-8 and run.outcome.label == "UNDECIDED":
@@ -74,13 +79,14 @@ def test_door_on_slightly_tilted_hinges_is_held_or_its_run_is_undecided(tilt, se
     else:
         assert run.outcome.label == "COMPLETED", run.message
         moved = np.abs(run.position - scene.body[0].position).max()
-        assert moved < max(1e-12, np.finfo(float).eps / tilt)
+        assert moved < 1e-12 + np.finfo(float).eps / tilt
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 @pytest.mark.parametrize(("tilt", "reported"), [(1e-11, True), (1e-15, False)])
-def test_door_on_hinges_tilted_by_rounding_swings(tilt, reported, seed):
-    """A tilt above the rounding of the axes is reported; the door falls by more than 0.1 m in 0.2 s."""
+def test_door_on_hinges_tilted_by_rounding_swings_and_a_tilt_above_rounding_is_reported(tilt, reported, seed):
+    """A door that swings falls by more than 0.1 m in 0.2 s; a held one does not move. 1e-11 rad is above the
+    rounding of the axes, 1e-15 rad is not."""
     scene = door(tilt, seed)
     run = simulate(scene, "taylor", [0.1, 0.2])
     assert run.outcome.label == "COMPLETED", run.message
@@ -90,7 +96,8 @@ def test_door_on_hinges_tilted_by_rounding_swings(tilt, reported, seed):
 
 @pytest.mark.parametrize("tilt", [1e-5, 1e-7, 1e-8])
 def test_flap_on_a_door_that_tilted_hinges_hold_swings_as_on_a_welded_door(tilt):
-    """The held door does not move, so that the flap is a pendulum on a fixed hinge."""
+    """The held door does not move, so that the flap is a pendulum on a fixed hinge; welding the door to the
+    ground removes the tilted hinges. Positions agree to rtol (m)."""
     held = door(tilt, seed=1)
     at = held.body[0].position
     flap = Body(
@@ -107,7 +114,7 @@ def test_flap_on_a_door_that_tilted_hinges_hold_swings_as_on_a_welded_door(tilt)
     tilted = simulate(held.with_(body=bodies, joint=(*held.joint, hinge)), "taylor", times)
     fixed = simulate(held.with_(body=bodies, joint=(wall, hinge)), "taylor", times)
     assert tilted.outcome.label == fixed.outcome.label == "COMPLETED", tilted.message
-    assert np.abs(tilted.position - fixed.position).max() < 1e-9
+    assert np.abs(tilted.position - fixed.position).max() < RTOL
 
 
 @pytest.mark.parametrize("inertia", [1e-8, 1e-6])
@@ -119,40 +126,44 @@ def test_small_bead_on_an_arm_swings_without_a_singular_position(inertia):
     run = simulate(scene, "taylor", np.linspace(0.0, 1.0, 11))
     radius = np.linalg.norm(run.position[:, 0], axis=1)
     assert run.outcome.label == "COMPLETED" and run.crossings == () and np.abs(radius - 1.0).max() < 1e-12
-    assert np.ptp(run.energy) < 1e-8
+    assert np.ptp(run.energy) < 10 * RTOL * run.kinetic_energy.max()
 
 
-@pytest.mark.parametrize("loop", RHOMBI)
+@pytest.mark.parametrize("loop", SWINGING)
 @pytest.mark.parametrize("distance", [1e-2, 1e-4, 1e-6])
-def test_swing_that_turns_back_before_the_flat_position_is_its_closed_form(loop, distance):
+def test_swing_that_turns_back_before_the_flat_position_meets_its_closed_form_and_crosses_nothing(
+    loop, distance
+):
     """A parallelogram released ``distance`` (rad) from the flat pose, on the side from which it swings
     back."""
-    scene = RHOMBI[loop][1](-distance)
-    assert error_of(scene, 1.5) < 1e-8
-    assert simulate(scene, "taylor", [1.5]).crossings == ()
+    scene = SWINGING[loop](-distance)
+    run = simulate(scene, "taylor", np.linspace(0.0, 1.5, 9))
+    assert run.outcome.label == "COMPLETED" and run.crossings == (), run.message
+    assert measure(scene, run, closed_form(scene))["error"] < 10 * RTOL
 
 
 @pytest.mark.parametrize(
     "rtol", [pytest.param(1e-6, marks=pytest.mark.slow), 1e-9, pytest.param(1e-11, marks=pytest.mark.slow)]
 )
 def test_crossings_of_a_chain_flat_in_both_loops_are_all_recorded(rtol):
-    """Ten crossings in 10 s, with the period of the motion; the determinant keeps its sign at each. Before, a
-    run recorded six."""
+    """Ten crossings in 10 s; the determinant keeps its sign at each. The motion is periodic: every second
+    crossing follows after one period, to 1e-4 s. Before, a run recorded six."""
     run = simulate(find_scene("four_bar_chain[2]"), "taylor", np.linspace(0.0, 10.0, 3), Limits(rtol=rtol))
     times = np.array([crossing.time for crossing in run.crossings])
     assert run.outcome.name == "COMPLETED" and len(times) == 10
-    assert np.abs(times[2:] - times[:-2] - (times[2] - times[0])).max() < 1e-4, "the motion is periodic"
+    assert np.abs(times[2:] - times[:-2] - (times[2] - times[0])).max() < 1e-4
 
 
-@pytest.mark.parametrize("loop", RHOMBI)
+@pytest.mark.parametrize("loop", SWINGING)
 def test_release_very_near_the_flat_position_is_right_or_undecided(loop):
     """Distances of 1e-8 to 1e-5 rad: below 5e-6 rad rounding may turn the motion from rest, and a run may end
-    UNDECIDED. Before, a run at 4e-8 rad completed 1.9e-6 off."""
+    UNDECIDED; its message says so if it ends at the start. Before, a run at 4e-8 rad completed 1.9e-6 off,
+    more than 1000 rtol."""
     for distance in np.geomspace(1e-8, 1e-5, 16):
-        scene = RHOMBI[loop][1](-distance)
+        scene = SWINGING[loop](-distance)
         run = simulate(scene, "taylor", np.linspace(0.0, 1.5, 21))
         if run.outcome.label == "COMPLETED":
-            assert measure(scene, run, closed_form(scene))["error"] < 1e-6, distance
+            assert measure(scene, run, closed_form(scene))["error"] < 1000 * RTOL, distance
         else:
             assert run.outcome.label == "UNDECIDED", run.message
             told = "begins near a singular position, rounding changes its motion" in run.message
@@ -161,32 +172,23 @@ def test_release_very_near_the_flat_position_is_right_or_undecided(loop):
 
 
 @pytest.mark.parametrize("rate", [-5.0, -0.5])
-def test_moving_start_near_the_flat_position_is_its_closed_form(rate):
-    """Distances of 1e-9 to 1e-5 rad; the judge has a closed form for at least six of nine."""
-    judged = 0
-    for distance in (*np.geomspace(-1e-6, -1e-9, 5), 1e-5, 1e-7, 2e-8, 3e-9):
-        scene = parallelogram(distance, "parallelogram").with_(gravity=(0.0, -9.81, 0.0))
-        crank, coupler, rocker = scene.body
-        turning = (
-            body.model_copy(update={"angular_velocity": (0.0, 0.0, turn)})
-            for body, turn in ((crank, rate), (coupler, 0.0), (rocker, rate))
-        )
-        scene = scene.with_(body=tuple(turning))
-        run, truth = simulate(scene, "taylor", np.linspace(0.0, 1.0, 11)), closed_form(scene)
-        assert run.outcome.label == "COMPLETED", run.message
-        if truth is not None:
-            judged += 1
-            assert measure(scene, run, truth)["error"] < 1e-6, distance
-    assert judged >= 6
+@pytest.mark.parametrize("distance", [-1e-6, -1.8e-7, -5.6e-9, -1e-9, 3e-9, 1e-5])
+def test_parallelogram_that_starts_moving_near_the_flat_position_meets_its_closed_form(distance, rate):
+    """Crank and rocker start ``distance`` (rad) from the flat pose with a rate (rad/s), the coupler at rest.
+    Errors against the judge's closed form are below 100 rtol."""
+    scene = parallelogram(distance, "parallelogram").with_(gravity=(0.0, -9.81, 0.0))
+    turning = {"crank": rate, "coupler": 0.0, "rocker": rate}
+    bodies = (b.model_copy(update={"angular_velocity": (0.0, 0.0, turning[b.name])}) for b in scene.body)
+    assert error_of(scene.with_(body=tuple(bodies)), 1.0) < 100 * RTOL
 
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6])
 def test_swing_that_turns_back_within_its_tolerance_is_right_or_undecided(rtol):
-    """A motion faster by rtol might cross the flat position. With 1e-6 at least one of the eight runs is
-    undecided, so that the sentence is tested."""
+    """A motion faster by rtol might cross the flat position, so that at least one of the eight runs is
+    undecided; a run that completes is within 1000 rtol of the closed form."""
     undecided = 0
     for distance in (1e-6, 1e-7, 1e-8, 1e-9):
-        for _, swing in RHOMBI.values():
+        for swing in SWINGING.values():
             scene = swing(-distance)
             run = simulate(scene, "taylor", np.linspace(0.0, 1.5, 9), Limits(rtol=rtol))
             if run.outcome.label == "COMPLETED":
@@ -194,59 +196,55 @@ def test_swing_that_turns_back_within_its_tolerance_is_right_or_undecided(rtol):
             else:
                 assert run.outcome.label == "UNDECIDED" and "singular position at t = " in run.message
                 undecided += 1
-    assert undecided > 0 or rtol > 1e-6
+    assert undecided > 0
 
 
-@pytest.mark.parametrize("loop", RHOMBI)
-def test_samples_of_a_motion_that_passes_near_the_flat_position_are_right(loop):
-    """Released 1e-6 rad from it. A run may end UNDECIDED if it cannot distinguish the branches, here not
-    before the fourth sample; its samples up to then are right."""
-    scene = RHOMBI[loop][1](1e-6)
-    run = simulate(scene, "taylor", np.linspace(0.0, 1.5, 9), Limits())
-    assert run.outcome.label in ("COMPLETED", "UNDECIDED") and len(run.times) >= 4, run.message
-    assert measure(scene, run, closed_form(scene))["error"] < 2.6e-6  # of the length; found: 2.6e-7
+@pytest.mark.parametrize("loop", SWINGING)
+@pytest.mark.parametrize("distance", [3e-5, 1e-4])
+def test_swing_through_two_flat_positions_from_near_one_meets_its_closed_form(loop, distance):
+    """Released from rest ``distance`` (rad) behind a flat position, on the side on which it falls to the
+    other one and comes back. Nearer than 1e-5 rad rounding may decide on the branch."""
+    assert error_of(SWINGING[loop](distance), 1.5) < 10 * RTOL
 
 
-@pytest.mark.parametrize("loop", RHOMBI)
+@pytest.mark.parametrize("loop", SWINGING)
 @pytest.mark.parametrize("distance", [1e-7, 1e-8])
 def test_motion_from_very_near_the_flat_position_is_undecided_at_its_start(loop, distance):
-    run = simulate(RHOMBI[loop][1](distance), "taylor", [0.0, 1.5])
+    """Released from rest ``distance`` (rad) from it: rounding of 1e-16 over the squared distance decides."""
+    run = simulate(SWINGING[loop](distance), "taylor", [0.0, 1.5])
     assert run.outcome.label == "UNDECIDED" and not len(run.times)
     assert "singular position at t = 0 s" in run.message
 
 
 @pytest.mark.parametrize("gap", [1e-2, 1e-5, 1e-8, 1e-10])
 def test_slider_crank_with_a_longer_rod_turns_past_its_dead_centre_as_its_closed_form(gap):
-    """The rod is longer than the crank by the gap (m), so that two branches miss each other by about √gap."""
+    """The rod is longer than the crank by the gap (m), so that two branches do not meet, apart by about
+    √gap."""
     scene = slider_crank(0.308, 0.308 + gap, 0.3, "gap", rate=30.0)
-    assert error_of(scene, 0.25, "taylor") < 1e-6
+    assert error_of(scene, 0.25) < RTOL
 
 
 @pytest.mark.parametrize("gap", [1e-12, 7.4e-10, 2.2e-9, 6.7e-9, 2.0e-8])
 def test_long_steps_of_a_loose_tolerance_do_not_change_branch_over_a_gap(gap):
-    """The rod is longer than the crank by the gap (m)."""
+    """The rod is longer than the crank by the gap (m). On the other branch the slider would be off by its
+    stroke, 0.6 m; with rtol 1e-5 the error stays below three times this."""
     scene = slider_crank(0.308, 0.308 + gap, 0.3, "gap", rate=30.0)
-    assert error_of(scene, 0.5, rtol=1e-5) < 3e-5  # ten times what runs are off
+    assert error_of(scene, 0.5, rtol=1e-5) < 3 * 1e-5
 
 
 @pytest.mark.parametrize(("gap", "passed"), [(2e-15, 1), (3e-14, 0)])
-def test_gap_of_the_size_of_rounding_counts_as_a_crossing(gap, passed):
-    """Lengths of 0.308 m have a rounding of 3e-17 m, and poses of about 1e-15 m."""
+def test_only_a_gap_of_the_size_of_rounding_counts_as_a_crossing(gap, passed):
+    """The rod is longer than the crank by the gap (m). Lengths of 0.308 m have a rounding of 3e-17 m, and
+    poses of about 1e-15 m."""
     scene = slider_crank(0.308, 0.308 + gap, 0.3, "gap", rate=30.0)
     run = simulate(scene, "taylor", [0.25], Limits())
     assert run.outcome.label == "COMPLETED" and len(run.crossings) == passed
 
 
-@pytest.mark.parametrize("loop", RHOMBI)
-@pytest.mark.parametrize("distance", [1e-2, 1e-4, 1e-6])
-def test_driven_start_near_the_flat_position_is_its_closed_form(loop, distance):
-    """Crank and rocker turn by the driver's angle, and the coupler does not turn."""
-    assert error_of(RHOMBI[loop][0](math.pi + distance), 0.1) < 1e-9
-
-
 @pytest.mark.parametrize("inertia", [1e-11, 1e-9])
 def test_small_bead_on_a_cart_keeps_the_energy(inertia):
-    """With a bead of 1e-11 kg m², unit rows in the metric of the masses are nearly parallel."""
+    """With a bead of 1e-11 kg m², unit rows in the metric of the masses are nearly parallel, which magnifies
+    rounding."""
     cart = Body(name="cart", mass=1.0, inertia=(1e-2,) * 3, position=(0.0, 0.0, 0.0))
     bead = Body(name="bead", mass=1.0, inertia=(inertia,) * 3, position=(1.0, 0.0, 0.0))
     joints = (
@@ -255,14 +253,19 @@ def test_small_bead_on_a_cart_keeps_the_energy(inertia):
     )
     scene = Scene(name="cart_pole", gravity=(0.0, 0.0, -9.81), body=(cart, bead), joint=joints)
     run = simulate(scene, "taylor", np.linspace(0.0, 1.0, 9), Limits())
-    assert run.outcome.label == "COMPLETED" and np.ptp(run.energy) < 1e-5
+    assert run.outcome.label == "COMPLETED"
+    assert np.ptp(run.energy) < 1e-5 * np.ptp(run.kinetic_energy)
 
 
-@pytest.mark.parametrize("loop", RHOMBI)
-@pytest.mark.parametrize("angle", [0.3, 1e-2, math.pi - 1e-3])
-def test_driven_parallelogram_crosses_from_any_angle_as_its_closed_form(loop, angle):
-    """Crank and rocker turn by the driver's angle, and the coupler does not turn."""
-    assert error_of(RHOMBI[loop][0](angle), 2.5) < 1e-11
+@pytest.mark.parametrize("loop", DRIVEN)
+@pytest.mark.parametrize(
+    ("angle", "end"),
+    [(0.3, 2.5), (1e-2, 2.5), (math.pi - 1e-3, 2.5), (math.pi + 1e-4, 0.1), (math.pi + 1e-6, 0.1)],
+)
+def test_driven_parallelogram_crosses_from_any_angle_as_its_closed_form(loop, angle, end):
+    """Crank and rocker turn by the driver's angle, and the coupler does not turn; in 2.5 s rounding adds up
+    over a hundred flat positions."""
+    assert error_of(DRIVEN[loop](angle), end) < 1e-11
 
 
 def leaning(links: tuple[tuple[float, float], ...], lean: float = 0.0) -> Scene:
@@ -298,25 +301,28 @@ def turned_back(angle: float, distance: float) -> Scene:
 
 
 @pytest.mark.parametrize("distance", [0.0, 1e-9, 1e-8])
-def test_driver_that_turns_back_at_the_flat_position_returns_to_the_start_or_is_undecided(distance):
-    """After 1 s the driver is at its first angle, and so is the parallelogram. Before, runs completed on the
-    other branch."""
-    for angle in np.linspace(0.3, 0.9, 60):
+def test_no_run_whose_driver_turns_back_at_the_flat_position_completes_on_another_branch(distance):
+    """After 1 s the driver is at its first angle, and so is the parallelogram, unless rounding changed the
+    branch where it turned back. Runs are UNDECIDED. Before, some completed on the other branch."""
+    for angle in np.linspace(0.3, 0.9, 20):
         scene = turned_back(float(angle), distance)
         run = simulate(scene, "taylor", [1.0])
-        assert run.outcome.label in ("COMPLETED", "UNDECIDED"), run.message
         if run.outcome.label == "COMPLETED":
             assert np.abs(run.position[-1] - [body.position for body in scene.body]).max() < 1e-6, angle
+        else:
+            assert run.outcome.label == "UNDECIDED", run.message
 
 
 @pytest.mark.parametrize("distance", [1e-6, 1e-4])
 def test_driver_that_turns_back_before_the_flat_position_returns_to_the_start(distance):
-    """The driver is at its first angle after 1 s; nothing is crossed."""
+    """The driver is at its first angle after 1 s, and so is the parallelogram, to rounding (m) over the
+    distance; nothing is crossed."""
     for angle in np.linspace(0.3, 0.9, 10):
         scene = turned_back(float(angle), distance)
         run = simulate(scene, "taylor", [1.0])
         assert run.outcome.label == "COMPLETED" and not run.crossings, run.message
-        assert np.abs(run.position[-1] - [body.position for body in scene.body]).max() < 1e-8
+        moved = np.abs(run.position[-1] - [body.position for body in scene.body]).max()
+        assert moved < 1e-14 / distance
 
 
 def test_crossings_of_two_loops_that_follow_each_other_in_a_step_are_recorded():
@@ -333,9 +339,8 @@ def test_crossings_of_two_loops_that_follow_each_other_in_a_step_are_recorded():
 
 
 def test_message_counts_the_crossings_of_a_motion():
-    scene = planar_slider_crank_heavy()
-    run = simulate(scene, "taylor", np.linspace(0.0, 5.0, 6))
-    assert run.outcome.label == "COMPLETED" and measure(scene, run, closed_form(scene))["error"] < 1e-9
+    """The heavy crank of a slider-crank passes some in 5 s."""
+    run = simulate(planar_slider_crank_heavy(), "taylor", [5.0])
     assert f"singular positions passed: {len(run.crossings)}" in run.message and run.crossings
 
 
@@ -345,8 +350,10 @@ def test_message_counts_the_crossings_of_a_motion():
     ids=["driven", "swinging", "swinging from higher"],
 )
 def test_accelerations_velocities_and_reactions_near_a_crossing_are_exact(scene):
-    """Closed form and reactions of the judge. Without drivers, reactions are off by rounding over the
-    distance from the crossing (rad of the crank)."""
+    """Closed form and reactions of the judge, at distances (rad of the crank) of up to 0.1 on both sides,
+    over the largest value. Accelerations meet it to ten rtol, velocities to rounding. Driven, reactions meet
+    it to 1e-6; free, to rtol over the distance, or over 3e-5 rad if it is nearer. Nearer than 1e-7 rad the
+    judge's rank leaves reactions open: there they are as at the sample before."""
     (crossing, *_) = simulate(scene, "taylor", [0.3]).crossings
     rate = np.abs(crossing.angular_velocity[0]).max()
     distances = np.array([1e-1, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6, 1e-9])
@@ -359,7 +366,7 @@ def test_accelerations_velocities_and_reactions_near_a_crossing_are_exact(scene)
     assert np.abs(run.velocity - exact.velocity).max() < 3e-11 * speeds
     away = np.concatenate([distances, [0.0], distances[::-1]])
     allowed = 1e-6 if scene.driver else 1e-9 + 1e-9 / np.maximum(away, 3e-5)
-    beside = away < 1e-7  # the judge's rank leaves reactions open there: they are as at the sample before
+    beside = away < 1e-7
     for name, true in exact.reactions.items():
         found, largest = run.reactions[name], np.abs(true).max()
         off = np.abs(found - true).max(axis=1)

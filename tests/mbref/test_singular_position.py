@@ -24,7 +24,7 @@ WATCHING = (
     "mpi-gs+projection/adams",
     "alf+projection/rk4[step=1e-3]",
 )
-CROSSING = ("taylor", "alf-dual+none", "alf-dual+baumgarte", "alf+none")
+REGULARISED = ("alf-dual+none", "alf-dual+baumgarte", "alf+none")
 LOOPS = {
     "four": (four_bar_gravity(0.3, "four"), 1.0),
     "five": (five_bar_gravity(0.3, "five"), 1.0),
@@ -47,7 +47,8 @@ def first_crossing(scene: Scene, end: float) -> float:
 @pytest.mark.parametrize("method", WATCHING)
 @pytest.mark.parametrize("loop", LOOPS)
 def test_run_that_watches_the_rank_ends_at_the_first_singular_position(loop, method):
-    """The run ends within 0.2 % of the motion at the closed form's first singular time, uncrossed."""
+    """The run ends within 0.2 % of its duration at the closed form's first singular time, uncrossed; the
+    message names a method that crosses."""
     scene, end = LOOPS[loop]
     time = first_crossing(scene, end)
     run = simulate(scene, method, np.linspace(0.0, end, 41))
@@ -60,64 +61,73 @@ def test_run_that_watches_the_rank_ends_at_the_first_singular_position(loop, met
     assert "lose rank" in run.message and "taylor does" in run.message
 
 
-@pytest.mark.parametrize("loop", ["four", "five"])
-def test_message_names_the_joints_that_lose_rank(loop):
-    """All joints of the loop take part where its links are in line."""
-    scene, end = LOOPS[loop]
-    message = simulate(scene, "alf-dual+projection", [end]).message
+@pytest.mark.parametrize(
+    "scene",
+    [LOOPS["four"][0], LOOPS["five"][0], find_scene("four_bar_chain[3]")],
+    ids=lambda scene: scene.name,
+)
+def test_message_names_the_joints_that_lose_rank(scene):
+    """All joints of a loop take part where its links are in line, and the three loops of a chain are flat at
+    once."""
+    message = simulate(scene, "alf-dual+projection", [2.0]).message
     assert all(repr(joint.name) in message for joint in scene.joint), message
 
 
 def test_recorded_pose_of_a_flat_parallelogram_has_all_bodies_on_its_line():
-    """Steps end near the singular position, within 1 cm of the x axis."""
+    """The links of 0.5 m lie on the x axis where it is flat; the last step ends within 0.1 mm of it."""
     scene, end = LOOPS["four"]
     run = simulate(scene, "alf-dual+projection", [end])
-    assert np.abs(run.crossings[0].position[:, 1]).max() < 1e-2
+    assert np.abs(run.crossings[0].position[:, 1]).max() < 1e-4
 
 
 FAILURES = ("LEFT_MOTION", "NOT_CONVERGED", "STEP_FAILED")  # rounding decides which one
 
 
-@pytest.mark.parametrize("method", CROSSING)
 @pytest.mark.parametrize("loop", LOOPS)
-def test_method_that_claims_to_cross_is_right_after_the_singular_position(loop, method):
-    """Truth: closed form. A method that crosses by regularisation may fail or report that it left the
-    motion."""
+def test_taylor_meets_the_closed_form_after_the_singular_position(loop):
+    """To ten times rtol, 1e-8; it claims to cross by series."""
     scene, end = LOOPS[loop]
-    crosses = Method.parse(method).crosses
-    assert crosses == ("by series" if method == "taylor" else "by regularisation")
+    assert Method.parse("taylor").crosses == "by series"
+    run = simulate(scene, "taylor", np.linspace(0.0, end, 21), Limits(rtol=1e-8))
+    assert run.outcome.name == "COMPLETED", run.message
+    assert measure(scene, run, closed_form(scene))["error"] < 10 * 1e-8
+
+
+@pytest.mark.parametrize("method", REGULARISED)
+@pytest.mark.parametrize("loop", LOOPS)
+def test_regularised_method_meets_the_closed_form_after_the_singular_position_or_fails(loop, method):
+    """It claims to cross by regularisation. A run completes within 1000 times rtol, 1e-8, or reports that it
+    failed or left its motion."""
+    scene, end = LOOPS[loop]
+    assert Method.parse(method).crosses == "by regularisation"
     run = simulate(scene, method, np.linspace(0.0, end, 21), Limits(rtol=1e-8))
     error = measure(scene, run, closed_form(scene))["error"]
     if run.outcome.name == "COMPLETED":
-        assert error < 1e-5
+        assert error < 1000 * 1e-8
     else:
-        assert method != "taylor" and run.outcome.name in FAILURES, run.message
+        assert run.outcome.name in FAILURES, run.message
 
 
 @pytest.mark.parametrize("method", ["alf-dual+none", "alf+baumgarte"])
 def test_regularised_method_crosses_the_flat_position_of_a_rhombus_as_its_closed_form(method):
-    """In the closed form the coupler does not turn, and the cranks have one angle, by the energy."""
+    """In the closed form the coupler does not turn, and the cranks have one angle, by the energy. The error
+    is below 1000 rtol."""
     scene = four_bar_gravity()
     run = simulate(scene, method, np.linspace(0.0, 0.5, 5), Limits(rtol=1e-7))
     assert run.outcome.name == "COMPLETED", run.message
-    assert first_crossing(scene, 0.5) < 0.5 and measure(scene, run, closed_form(scene))["error"] < 1e-4
+    assert first_crossing(scene, 0.5) < 0.5
+    assert measure(scene, run, closed_form(scene))["error"] < 1000 * 1e-7
 
 
 @pytest.mark.parametrize("rtol", [1e-5, 1e-8])
 @pytest.mark.parametrize("loops", [2, 3, 5, 12])
 def test_run_ends_where_all_loops_of_a_chain_are_flat(loops, rtol):
-    """With an even number of loops the determinant keeps its sign there. Before, runs went on."""
+    """With an even number of loops the determinant keeps its sign there. The time is the closed form's, to
+    0.5 ms. Before, runs went on."""
     scene = find_scene(f"four_bar_chain[{loops}]")
     run = simulate(scene, "alf-dual+projection", [2.0], Limits(rtol=rtol))
     assert run.outcome.name == "SINGULAR_POSITION", run.message
     assert run.t_end == pytest.approx(first_crossing(scene, 1.0), abs=5e-4)
-
-
-def test_message_names_the_joints_of_every_flat_loop():
-    """The three loops of a chain are flat at once."""
-    scene = find_scene("four_bar_chain[3]")
-    message = simulate(scene, "alf-dual+projection", [2.0]).message
-    assert all(repr(joint.name) in message for joint in scene.joint), message
 
 
 @pytest.mark.parametrize("rtol", [1e-5, 1e-8])
@@ -148,6 +158,8 @@ def test_large_chains_of_slider_cranks_complete_and_of_four_bars_end_flat(loops)
 
 @pytest.mark.parametrize("distance", [3e-2, 1e-1])
 def test_swing_that_turns_back_before_the_flat_position_is_completed_by_projection(distance):
+    """Released ``distance`` (rad) from it; nothing is crossed, and the closed form is met to 1000 times rtol,
+    1e-9."""
     scene = four_bar_gravity(-distance)
     run = simulate(scene, "alf-dual+projection", np.linspace(0.0, 1.5, 9))
     assert run.outcome.name == "COMPLETED", run.message
@@ -156,7 +168,8 @@ def test_swing_that_turns_back_before_the_flat_position_is_completed_by_projecti
 
 @pytest.mark.parametrize("gap", [1e-2, 1e-3, 1e-5, 1e-7])
 def test_run_near_a_missed_singular_position_is_right_or_does_not_complete(gap):
-    """The rod is longer than the crank by the gap (m)."""
+    """The rod is longer than the crank by the gap (m). A run that completes is within 1000 rtol, at least
+    1e-6, of the closed form: with a larger difference from a projected run its outcome is another one."""
     scene = slider_crank(0.308, 0.308 + gap, 0.3, "gap", rate=30.0)
     for rtol in (1e-5, 1e-9):
         run = simulate(scene, "alf-dual+projection", np.linspace(0.0, 0.25, 21), Limits(rtol=rtol))
@@ -165,6 +178,7 @@ def test_run_near_a_missed_singular_position_is_right_or_does_not_complete(gap):
 
 
 def test_run_from_a_singular_position_ends_at_its_start_if_the_method_does_not_cross():
+    """The rhombus is released at angle 0, where it is flat."""
     run = simulate(four_bar_gravity(0.0), "alf-dual+projection", [0.0, 0.5])
     assert run.outcome.name == "SINGULAR_POSITION" and run.t_end == 0.0, run.message
 
@@ -189,7 +203,8 @@ def test_kernels_return_before_the_step_in_which_the_crossing_lies():
 
 @pytest.mark.parametrize("name", ["point_pendulum", "bricard_thin"])
 def test_bodies_without_inertia_about_an_axis_keep_their_energy(name):
-    """A point mass and a linkage of thin rods, by the default method."""
+    """A point mass and a linkage of thin rods, by the default method, in 2 s; energies change by less than
+    rtol of 1 J and the kinetic energy."""
     scene = SCENES[name]()
     run = simulate(scene, times=np.linspace(0.0, 2.0, 21))
     assert run.outcome.name == "COMPLETED", run.message

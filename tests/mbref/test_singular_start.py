@@ -14,6 +14,8 @@ from mbref.scenes.four_bar import four_bar
 from mbref.scenes.planar_slider_crank import slider_crank
 
 UPRIGHT = math.pi / 2  # rad: crank and rod of equal lengths lie on each other
+RTOL = 1e-9
+ROUNDING = 1e-12  # of poses over the length
 
 
 def upright_slider_crank(rod: float | None) -> Scene:
@@ -34,15 +36,16 @@ def test_driven_loop_starts_flat_and_moves_as_its_closed_form(linkage, angle):
     scene = linkage(angle)
     run = simulate(scene, "taylor", np.linspace(0.0, 0.1, 21), Limits(rtol=1e-9))
     assert run.outcome.name == "COMPLETED", run.message
-    assert measure(scene, run, truth_for(scene))["error"] < 1e-13 and len(run.crossings) == 3
+    assert measure(scene, run, truth_for(scene))["error"] < ROUNDING and len(run.crossings) == 3
 
 
 def test_crank_that_starts_upright_moves_its_slider_as_the_closed_form():
-    """The rod turns against the crank, so that the slider moves."""
+    """The rod turns against the crank at -30 rad/s, so that the slider moves. In 0.5 s the crank turns by 15
+    rad and is upright or hangs seven times more; the judge's closed form has only the angle of the crank."""
     scene = upright_slider_crank(-30.0)
     run = simulate(scene, "taylor", np.linspace(0.0, 0.5, 21), Limits(rtol=1e-9))
     assert run.outcome.name == "COMPLETED", run.message
-    assert measure(scene, run, truth_for(scene))["error"] < 1e-7 and len(run.crossings) == 7
+    assert measure(scene, run, truth_for(scene))["error"] < 100 * RTOL and len(run.crossings) == 7
 
 
 def test_missing_velocities_choose_the_branch_of_the_least_kinetic_energy():
@@ -52,8 +55,8 @@ def test_missing_velocities_choose_the_branch_of_the_least_kinetic_energy():
     run = simulate(upright_slider_crank(None), "taylor", times, Limits(rtol=1e-9))
     assert run.outcome.name == "COMPLETED" and "branch with the least kinetic energy" in run.message
     exact = 0.154 * np.column_stack([np.cos(UPRIGHT + 30.0 * times), np.sin(UPRIGHT + 30.0 * times)])
-    assert np.abs(run.position[:, :2, :2] - exact[:, None]).max() < 1e-9
-    assert np.abs(run.position[:, 2]).max() < 1e-9
+    assert np.abs(run.position[:, :2, :2] - exact[:, None]).max() < RTOL  # m
+    assert np.abs(run.position[:, 2]).max() < RTOL
 
 
 def test_velocities_that_belong_to_no_branch_are_undecided():
@@ -91,12 +94,14 @@ def test_slow_start_along_the_weight_falls_with_its_energy(rate):
     x, y = run["crank"].position[:, :2].T
     inertia, rates = 2 * (0.02 + 0.3**2 / 4) + 0.3**2, run["crank"].angular_velocity[:, 2]
     energy = 0.5 * inertia * rates**2 + 2 * 9.81 * 0.3 * np.sin(np.arctan2(y, x))
-    assert np.abs(energy - 0.5 * inertia * rate**2).max() < 1e-9
-    assert np.abs(run["coupler"].angular_velocity).max() < 1e-9 and rates[-1] < -5.0
+    assert rates[-1] < -5.0, "it falls"
+    assert np.abs(energy - 0.5 * inertia * rate**2).max() < RTOL * inertia * rates[-1] ** 2
+    assert np.abs(run["coupler"].angular_velocity).max() < RTOL * abs(rates[-1])
 
 
 def test_slow_start_against_the_weight_is_undecided_at_its_singular_position():
-    """The motion turns back after about 1e-6 rad."""
+    """The weight stops it after ½ I ω² / m g l, about 1e-6 rad, from where it falls through the singular
+    position again."""
     run = simulate(falling_parallelogram(0.01), "taylor", np.linspace(0.0, 1.0, 9))
     assert run.outcome.name == "UNDECIDED" and run.t_end == 0.0 and not run.times.size
     assert run.message.endswith(
@@ -119,6 +124,7 @@ def test_message_of_an_undecided_run_also_states_the_branch_at_its_start():
 
 
 def test_branches_of_a_start_at_rest_are_listed_without_velocities():
+    """Projection ends at the start, where two branches meet; nothing moves."""
     [met] = simulate(falling_parallelogram(0.0), "mpi-svd+projection", [0.0, 0.1]).crossings
     assert met.sentence == "2 branches" and not np.any(met.angular_velocity)
 
@@ -130,7 +136,7 @@ def test_run_of_a_microsecond_from_a_singular_position_is_exact():
         times = np.linspace(0.0, end, 3)
         run = simulate(scene, times=times)
         assert run.outcome.name == "COMPLETED" and len(run.times) == 3, run.message
-        assert measure(scene, run, truth_for(scene))["error"] < 1e-12
+        assert measure(scene, run, truth_for(scene))["error"] < ROUNDING
 
 
 @pytest.mark.parametrize("linkage", [four_bar, five_bar])
@@ -141,7 +147,7 @@ def test_driven_loop_starts_up_to_1e_7_rad_from_flat_and_moves_as_its_closed_for
         scene = linkage(math.pi + side * distance)
         run = simulate(scene, "taylor", np.linspace(0.0, 0.05, 6), Limits(rtol=1e-9))
         assert run.outcome.name == "COMPLETED", f"{distance}: {run.message}"
-        assert measure(scene, run, truth_for(scene))["error"] < 1e-11, distance
+        assert measure(scene, run, truth_for(scene))["error"] < ROUNDING, distance
 
 
 def spherical_loop(crank: float, coupler: float, angle: float, rates: tuple[float, float]) -> Scene:
@@ -191,7 +197,8 @@ def ratio(crank: float, coupler: float) -> float:
 
 @pytest.mark.parametrize("rate", [2.0, -5.0])
 def test_spherical_loop_leaves_the_flat_position_on_the_branch_of_its_velocities(rate):
-    """The ratio k of the half tangents of rocker and crank is constant (closed form), and the energy too."""
+    """The ratio k of the half tangents of rocker and crank is constant (closed form), and so is the energy,
+    to 100 and 1000 times rtol, while the crank moves."""
     for crank, coupler in ((0.7, 1.1), (1.2, 0.5), (0.9, 1.3)):
         k = ratio(crank, coupler)
         scene = spherical_loop(crank, coupler, 0.0, (rate, k * rate))
@@ -199,9 +206,9 @@ def test_spherical_loop_leaves_the_flat_position_on_the_branch_of_its_velocities
         assert run.outcome.label == "COMPLETED", run.message
         q = run.orientation
         first, last = q[:, 0, 1:] @ arc(0.0), q[:, 2, 1:] @ arc(coupler)
-        assert np.abs(last * q[:, 0, 0] - k * first * q[:, 2, 0]).max() < 1e-7
+        assert np.abs(last * q[:, 0, 0] - k * first * q[:, 2, 0]).max() < 100 * RTOL
         assert np.ptp(first) > 0.1, "the crank moves"
-        assert np.ptp(run.energy) < 1e-6 * np.abs(run.energy).max()
+        assert np.ptp(run.energy) < 1000 * RTOL * np.abs(run.energy).max()
 
 
 def test_start_near_the_flat_position_of_a_spherical_loop_does_not_shorten_later_steps():

@@ -17,7 +17,8 @@ FIELDS = ("position", "velocity", "angular_velocity", "acceleration", "angular_a
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 3, 4, 7, 21, 23, 24])
 def test_random_mechanism_moves_and_loads_its_joints_as_the_judge_s_reference(seed):
-    """Poses, rates and accelerations to 1e-7 of the largest, and all reactions that are unique."""
+    """Nine random mechanisms: poses, rates, accelerations, and all reactions that are unique, to 1e-7 of the
+    largest. Near singular positions accelerations magnify rtol, 1e-11."""
     scene, times = random_mechanism(seed), np.linspace(0.0, 0.1, 4)
     run = simulate(scene, "taylor", times, Limits(rtol=1e-11))
     exact = with_exact_reactions(scene, truth_for(scene).poses(times))
@@ -44,13 +45,14 @@ def test_error_falls_with_the_tolerance_and_is_below_a_thousand_tolerances(name)
 
 
 def test_number_of_samples_changes_neither_steps_nor_end():
+    """Runs with 2 and 41 samples end at one pose to the bit."""
     scene = SCENES["planar_slider_crank"]()
     few, many = (simulate(scene, "taylor", np.linspace(0, 0.05, k), Limits(rtol=1e-9)) for k in (2, 41))
     assert few.cost.steps == many.cost.steps
     assert np.array_equal(few.position[-1], many.position[-1])
 
 
-def test_taylor_is_a_method_of_its_own_and_old_records_name_it_otherwise():
+def test_taylor_named_as_the_integrator_of_alf_dual_in_old_records_is_the_method_taylor():
     assert str(Method.parse("taylor[order=14]")) == "taylor[order=14]"
     assert Method.parse("alf-dual+projection/taylor[order=14]") == Method.parse("taylor[order=14]")
 
@@ -60,11 +62,6 @@ def test_taylor_with_a_formulation_and_orders_above_30_are_refused():
         Method.parse("lm1+none/taylor[order=8]")
     with pytest.raises(ValueError, match="order must be 4 to 30, got 31"):
         simulate(SCENES["point_pendulum"](), "taylor[order=31]", [0.1])
-
-
-def test_largest_number_of_steps_ends_a_run_by_series():
-    run = simulate(SCENES["planar_slider_crank"](), "taylor", [0.1], Limits(most_steps=3))
-    assert (run.outcome.name, run.cost.steps) == ("STEP_FAILED", 3)
 
 
 @pytest.mark.parametrize("length", [0.05, 1.0, 30.0])
@@ -100,11 +97,12 @@ def test_pendulum_on_a_driven_cart_swings_in_a_constant_field(axis, length):
 
 @pytest.mark.parametrize("name", ["planar_slider_crank_equal", "planar_slider_crank_heavy"])
 def test_acceleration_at_a_singular_position_is_exact_and_reactions_are_open(name):
-    """The judge's closed form at the first crossing, just after it and later."""
+    """The judge's closed form at the first crossing, just after it and later, to 100 rtol of the largest. At
+    the crossing each joint has one more open component than later."""
     scene = SCENES[name]()
     crossing = simulate(scene, "taylor", [2.0 if "heavy" in name else 0.1]).crossings[0].time
     times = crossing * np.array([1.0, 1.0 + 3e-7, 1.2])
     run, exact = simulate(scene, "taylor", times), truth_for(scene).poses(times).acceleration
     assert run.outcome.name == "COMPLETED", run.message
-    assert np.abs(run.acceleration - exact).max() < 1e-5 * np.abs(exact).max()
-    assert all(marks[0] > marks[2] for marks in run.open_reactions.values())
+    assert np.abs(run.acceleration - exact).max() < 100 * 1e-9 * np.abs(exact).max()
+    assert run.open_reactions and all(count[0] > count[2] for count in run.open_reactions.values())

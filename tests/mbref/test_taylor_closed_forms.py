@@ -1,4 +1,5 @@
-"""The Taylor method / motions that are formulas: springs, drivers, full turns, phases, errors asked for."""
+"""The method taylor against closed forms: springs, drivers, full turns, phases, and errors over
+tolerances."""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ FINE = Limits(rtol=1e-12)
 
 @pytest.mark.parametrize("form", CLOSED_FORMS, ids=lambda form: form.__name__)
 def test_motion_by_series_is_the_closed_form(form):
-    """Every scene of crosscheck's closed forms; positions (m) and orientations (rad)."""
+    """Every scene of crosscheck's closed forms; positions (m) and orientations (rad) to 100 rtol."""
     scene, exact = form()
     times = np.linspace(0.0, scene.duration, 9)
     run = simulate(scene, "taylor", times, FINE)
@@ -26,7 +27,7 @@ def test_motion_by_series_is_the_closed_form(form):
     assert run.outcome.name == "COMPLETED", run.message
     off = np.abs(run.position - position).max()
     turned = rotations.angle_between(run.orientation, orientation).max()
-    assert max(off, turned) < 1e-10, f"{scene.name}: off by {off:.1e} m, {turned:.1e} rad"
+    assert max(off, turned) < 100 * FINE.rtol, f"{scene.name}: off by {off:.1e} m, {turned:.1e} rad"
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8])
@@ -55,12 +56,13 @@ def test_quaternion_of_a_spinning_body_is_continuous_over_full_turns(axis):
     half = 0.5 * spin * times
     exact = np.column_stack([np.cos(half), np.outer(np.sin(half), axis)])
     off = np.abs(run.orientation[:, 0] - exact).max()
-    assert off < 1e-10, f"off by {off:.1e}"
+    assert off < 100 * FINE.rtol, f"off by {off:.1e}"
 
 
 @pytest.mark.slow
 def test_phase_of_a_fast_top_is_exact_after_3000_radians():
-    """The judge's reference. Before, rounding was magnified, and the phase was off by 6e-7 rad."""
+    """The truth is the judge's reference; 1e-9 rad are 100 rtol. Before, rounding was magnified, and the
+    phase was off by 6e-7 rad."""
     scene = SCENES["heavy_top"]().with_(duration=4.0)
     times = np.linspace(0.0, scene.duration, 5)
     run = simulate(scene, "taylor", times, Limits(rtol=1e-11))
@@ -69,7 +71,9 @@ def test_phase_of_a_fast_top_is_exact_after_3000_radians():
 
 
 def angle_of_bar(beside: float, duration: float) -> float:
-    """Return the angle (rad) of the bar of the next test, by the equation of its one degree of freedom."""
+    """Return the angle (rad) of a bar of 0.4 m on a hinge by its equation J θ'' = torque of a spring. J =
+    0.0133 + 0.2² kg m², from 5 rad/s; the spring of 20 N/m and 0.3 m is between the bar's tip and a point at
+    ``beside`` - 0.4 m, where the integration stops and begins again."""
 
     def rates(t, y):
         tip, turned = (
@@ -113,8 +117,9 @@ def sprung_bar(speed: float, ends: tuple, **spring: float) -> Scene:
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 @pytest.mark.parametrize("beside", [0.0, 1e-9, 1e-4])
 def test_spring_whose_ends_meet_pulls_back_as_the_bar_s_own_equation(beside, rtol):
-    """Where the ends meet, or miss each other by ``beside`` (m), the force changes its direction. The truth
-    is the bar's equation of one degree of freedom, solved by SciPy with a stop where they meet."""
+    """Where the ends meet, or are apart by ``beside`` (m), the force changes its direction. The truth is the
+    bar's equation of one degree of freedom, solved by SciPy with a stop where they meet. The change magnifies
+    errors: 30 rtol are five times the largest error found (rad)."""
     scene = sprung_bar(5.0, ((beside - 0.4, 0.0, 0.0), (0.4, 0.0, 0.0)), natural_length=0.3)
     run = simulate(scene, "taylor", [0.0, 0.7], Limits(rtol=rtol))
     assert run.outcome.name == "COMPLETED", run.message
@@ -125,7 +130,8 @@ def test_spring_whose_ends_meet_pulls_back_as_the_bar_s_own_equation(beside, rto
     ("place", "damping"), [(0.4, 0.0), (-0.4, 0.5)], ids=["coincide at the start", "meet, with a damper"]
 )
 def test_spring_without_natural_length_turns_a_bar_as_its_equation(place, damping):
-    """From the ground at p to the bar's tip at a, p = ±a: J θ'' = -k a p sin θ - ½ c (a² + a p cos θ) θ'."""
+    """From the ground at p to the bar's tip at a, p = ±a: J θ'' = -k a p sin θ - ½ c (a² + a p cos θ) θ',
+    solved by SciPy."""
     scene = sprung_bar(12.0, ((place, 0.0, 0.0), (0.4, 0.0, 0.0)), natural_length=0.0, damping=damping)
     run = simulate(scene, "taylor", [0.0, 0.7], Limits(rtol=1e-9))
     inertia, tip, stiffness = 0.0133 + 0.2**2, 0.4, 20.0
@@ -136,4 +142,4 @@ def test_spring_without_natural_length_turns_a_bar_as_its_equation(place, dampin
 
     exact = solve_ivp(rates, (0.0, 0.7), (0.0, 12.0), method="DOP853", rtol=1e-12, atol=1e-13).y[0, -1]
     assert run.outcome.name == "COMPLETED", run.message
-    assert abs(run.joint("A").angle[-1] - exact) < 1e-8
+    assert abs(run.joint("A").angle[-1] - exact) < 10 * 1e-9  # rad, ten times rtol

@@ -1,4 +1,4 @@
-"""Calls as users write them: names of files, end times, tolerances / results or clear errors."""
+"""Calls as users write them: names of files, durations and tolerances."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ def test_duration_gives_a_run_101_samples_up_to_its_end(saved):
     assert np.array_equal(run.position, given.position)
 
 
-def test_rtol_is_the_tolerance_of_the_limits(saved):
+def test_argument_rtol_of_simulate_equals_rtol_of_limits(saved):
+    """A smaller one takes more steps; either way of giving it leads to one motion, to the bit."""
     loose, fine = (mbref.simulate(saved, "lm1+none", [2.0], rtol=rtol) for rtol in (1e-3, 1e-10))
     assert fine.cost.steps > loose.cost.steps, "the tolerance was not taken"
     same = mbref.simulate(saved, "lm1+none", [2.0], mbref.Limits(rtol=1e-10))

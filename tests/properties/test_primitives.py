@@ -22,7 +22,7 @@ def derivative(function):
     return np.tensordot(STENCIL, np.array(pairs), axes=1)
 
 
-def gap(one, other):
+def difference(one, other):
     """Return the largest difference of two arrays over the size of the second, if above 1."""
     scale = max(1.0, np.max(np.abs(other), initial=0.0))
     return np.max(np.abs(one - other), initial=0.0) / scale
@@ -34,8 +34,8 @@ def test_jacobian_is_the_derivative_of_phi(kind, driven, data):
     """Φ_q v is the rate of Φ(q(s)) with q' = v at one time t."""
     model = Model(data.draw(one_joint_scenes(kind, driven), label="scene"))
     t, q, v = data.draw(states(model.nb), label="state")
-    difference = derivative(lambda s: model.terms(t, displaced(q, s * v), v).phi)
-    assert gap(model.terms(t, q, v).jacobian @ v, difference) < TOLERANCE
+    rate = derivative(lambda s: model.terms(t, displaced(q, s * v), v).phi)
+    assert difference(model.terms(t, q, v).jacobian @ v, rate) < TOLERANCE
 
 
 @pytest.mark.parametrize(("kind", "driven"), CASES)
@@ -46,7 +46,7 @@ def test_jacobian_times_velocity_less_nu_is_the_rate_of_phi(kind, driven, data):
     t, q, v = data.draw(states(model.nb), label="state")
     terms = model.terms(t, q, v)
     rate = derivative(lambda s: model.terms(t + s, displaced(q, s * v), v).phi)
-    assert gap(terms.jacobian @ v - terms.nu, rate) < TOLERANCE
+    assert difference(terms.jacobian @ v - terms.nu, rate) < TOLERANCE
 
 
 @pytest.mark.parametrize(("kind", "driven"), CASES)
@@ -60,4 +60,4 @@ def test_gamma_is_the_negative_rate_of_the_velocity_equations(kind, driven, data
         terms = model.terms(t + s, displaced(q, s * v), v)  # constant r' and body-fixed ω': q̈ = 0
         return terms.jacobian @ v - terms.nu
 
-    assert gap(model.terms(t, q, v).gamma, -derivative(velocity_equations)) < TOLERANCE
+    assert difference(model.terms(t, q, v).gamma, -derivative(velocity_equations)) < TOLERANCE
