@@ -33,7 +33,8 @@ OTHER_TICKS = {  # building and stepping (s) of families that read the clock at 
 def test_cost_of_a_run_is_cpu_time_of_building_and_of_stepping(
     name: str, part: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A wall clock would give fractions of a second, and an interval that counts twice would give more."""
+    """By the clock of `ticks`, with the seconds of the module's docstring. A wall clock would give fractions
+    of a second, and an interval that counts twice would give more."""
     scene = able(name, driven_arm(), SCENES["planar_slider_crank_gravity"]().with_(duration=0.01))
     for setting in coarsest(name, scene, part):
         own = OTHER_TICKS.get((name, setting.family))

@@ -137,8 +137,8 @@ def test_polynomials_mbref_and_judge_have_equal_constraints_of_random_joints(
 
 @pytest.mark.parametrize("name", ["every_joint", "driven", "five_bar", "spatial_slider_crank_driven"])
 def test_derivatives_of_constraint_polynomials_are_difference_quotients(name: str) -> None:
-    """Φ' and Φ'' are central differences of Φ and Φ' along a motion with constant v and body-fixed ω over
-    2e-6 s; and Φ' = Φ_q v plus the drivers' rates."""
+    """Φ' and Φ'' are central differences of Φ and Φ' over 2e-6 s, along a motion with constant v and
+    body-fixed ω. The limit is MARGIN times the measured difference QUOTIENT."""
     scene, h = MECHANISMS[name], 1e-6
     s = Consistent(scene, 0.002, 7, 0.02)
     c = Constraints(scene)
@@ -152,6 +152,14 @@ def test_derivatives_of_constraint_polynomials_are_difference_quotients(name: st
         quotient = (after[k] - before[k]) / (2 * h)
         apart = abs(quotient - levels[k + 1]).max() / (1 + abs(levels[k + 1]).max())
         assert apart < MARGIN * QUOTIENT, f"{what}: relative difference {apart:.1e}"
+
+
+@pytest.mark.parametrize("name", ["every_joint", "driven", "five_bar", "spatial_slider_crank_driven"])
+def test_jacobian_of_constraint_polynomials_times_velocities_gives_their_rates(name: str) -> None:
+    """Φ' = Φ_q v - ν, where -ν is Φ' at rest: the drivers' rates."""
+    s = Consistent(MECHANISMS[name], 0.002, 7, 0.02)
+    c = Constraints(s.scene)
+    levels = c.levels(s.t, s.frames)
     jacobian = c.jacobian(s.t, s.frames)
     rest = c.levels(s.t, frames(s.r, s.p, 0 * s.v, 0 * s.omega))[1]
     apart = abs(jacobian @ np.hstack([s.v, s.omega]).ravel() + rest - levels[1]).max()

@@ -138,8 +138,7 @@ def test_every_engine_but_mbref_runs_the_copies() -> None:
 
 
 def test_the_copies_cut_the_loop_at_each_of_its_joints() -> None:
-    """The spanning tree of adapters that cut loops has one closure, at another joint in each copy `cut
-    at`."""
+    """The spanning tree of the adapters has one closure; in the copies, each joint is the closure of one."""
     scene, exact = four_bar()
     cuts = {scene.joint[spanning_tree(scene).closures[0].joint].name}
     for name, relation in COPIES.items():

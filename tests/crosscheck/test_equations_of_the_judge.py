@@ -103,8 +103,9 @@ def at_origin(kind: str, **fields) -> dict:
     return joint("J", kind, "ground", "b", **fields)
 
 
-def test_residuals_of_joints_are_displacements_and_angles_across_their_axis():
-    """A joint along z measures across it along y first, then along -x."""
+def test_residuals_of_joints_are_displacements_and_angles_that_they_prevent():
+    """A joint along z measures displacements along y, -x and z, then angles about y, -x and z. The body has
+    moved by 0.1 m along x, 0.2 m along y and 0.3 m along z, and has turned about one axis."""
     moved = (0.1, 0.2, 0.3)
     fixed, hinge = at_origin("fixed"), at_origin("revolute", axis=Z)
     assert residual(fixed, moved, about(Y, 0.4)) == pytest.approx([0.2, -0.1, 0.3, 0.4, 0.0, 0.0])
@@ -117,10 +118,18 @@ def test_residuals_of_joints_are_displacements_and_angles_across_their_axis():
     sleeve = at_origin("cylindrical", axis=Z)
     assert residual(sleeve, moved, about(X, 0.3)) == pytest.approx([0.2, -0.1, 0.0, -0.3])
     assert residual(at_origin("planar", axis=Z), moved, about(Y, -0.3)) == pytest.approx([0.3, -0.3, 0.0])
+
+
+def test_residual_of_a_universal_joint_is_the_angle_that_its_axes_lack_to_a_right_one():
+    """The second axis, y, turns by 0.3 rad towards the first one, reversed: -x."""
     cross = at_origin("universal", axes=(X, Y))
-    assert residual(cross, moved, about(Z, 0.3))[3] == pytest.approx(-0.3), "y turns towards -x"
+    assert residual(cross, (0.1, 0.2, 0.3), about(Z, 0.3))[3] == pytest.approx(-0.3)
+
+
+def test_residual_of_a_distance_joint_is_the_elongation_of_its_rod():
+    """The ends are 2 m apart at the start, and 5 m after a motion by (-2, 3, 4) m."""
     rod = at_origin("distance", anchors=((0.0, 0.0, 0.0), (2.0, 0.0, 0.0)))
-    assert residual(rod, (-2.0, 3.0, 4.0)) == pytest.approx([3.0]), "5 m instead of 2 m"
+    assert residual(rod, (-2.0, 3.0, 4.0)) == pytest.approx([3.0])
 
 
 def test_residual_of_a_driver_is_the_coordinate_less_its_law():

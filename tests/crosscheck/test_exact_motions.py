@@ -73,14 +73,14 @@ def test_gausss_principle_gives_the_nutation_of_a_heavy_symmetric_top():
     scene = heavy_top()
     about, own, arm, weight = 0.02 + 0.15**2, 0.012, 0.15, 9.81
     turned = rotations.from_vector(np.array([0.6, 0.0, 0.0]))
-    local = np.array([0.5, 1.0, 40.0])
-    momentum = rotations.rotate(turned, np.array([about, about, own]) * local)
-    p_phi, p_psi = momentum[2], own * local[2]
+    spin = np.array([0.5, 1.0, 40.0])  # rad/s at the start, about the top's axes; θ' is the first
+    momentum = rotations.rotate(turned, np.array([about, about, own]) * spin)
+    p_phi, p_psi = momentum[2], own * spin[2]
 
     def rates(t: float, y: np.ndarray) -> list[float]:
         c, s = np.cos(y[0]), np.sin(y[0])
-        gap = p_phi - p_psi * c
-        return [y[1], (gap**2 * c / s**3 - gap * p_psi / s) / about**2 + weight * arm * s / about]
+        p = p_phi - p_psi * c
+        return [y[1], (p**2 * c / s**3 - p * p_psi / s) / about**2 + weight * arm * s / about]
 
     times = np.linspace(0.0, scene.duration, 5)
     solved = solve_ivp(rates, (0.0, times[-1]), [0.6, 0.5], "DOP853", times, rtol=1e-12, atol=1e-12)

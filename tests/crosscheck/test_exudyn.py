@@ -125,7 +125,8 @@ def test_exudyn_gives_the_true_accelerations():
 @pytest.mark.parametrize("kind", [Revolute, Cylindrical])
 @pytest.mark.parametrize("bodies", [("ground", "b"), ("b", "ground")])
 def test_exudyn_swings_a_body_on_a_torsion_spring_beyond_a_turn(kind: type, bodies: tuple[str, str]):
-    """A damped oscillation about the natural angle 8 rad, with the decay c / (2 J)."""
+    """A damped oscillation φ = 8 rad (1 - e^(-δt) (cos ωt + δ/ω sin ωt)) about the natural angle, with the
+    decay δ = c / (2 J) and ω² = k / J - δ². TURNING is the measured error."""
     natural = 8.0 if bodies[0] == "ground" else -8.0  # the coordinate of the second body about the first
     spring = TorsionSpring(joint="J", stiffness=2.0, damping=0.05, natural_angle=natural)
     scene = one_body(**hinge(kind, bodies), load=(spring,))
