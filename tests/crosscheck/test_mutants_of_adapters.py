@@ -64,10 +64,7 @@ UNABLE = {  # an adapter and the kinds of defects that it cannot have
     "mjx": {FRAME: "MJX gives no reactions"},
     "warp": {FRAME: "MuJoCo Warp gives no reactions"},
     "newton": {FRAME: "Newton gives no reactions"},
-    "ondsel": {
-        LOAD: "OndselSolver receives no loads",
-        START: "the drivers prescribe the initial velocities",
-    },
+    "ondsel": {LOAD: "OndselSolver receives no loads", START: "the drivers prescribe the initial velocities"},
 }
 DEFECTS: dict[str, list[dict[str, str]]] = {way: [] for way in WAYS}
 for one in tomllib.loads(Path(__file__).with_name("defects_of_adapters.toml").read_text())["defect"]:

@@ -106,10 +106,7 @@ def test_shown_python_sets_the_solver_of_a_pinocchio_run():
             assert getattr(names["settings"], field) == getattr(own.solver, field), field
         assert names["h"] == 2e-4 and len(closures) > 0
         for closure, mine in zip(closures, own.closures, strict=True):
-            corrector, other = (
-                closure.m_baumgarte_parameters,
-                mine.m_baumgarte_parameters,
-            )
+            corrector, other = (closure.m_baumgarte_parameters, mine.m_baumgarte_parameters)
             assert np.allclose(corrector.Kp, other.Kp) and np.allclose(corrector.Kd, other.Kd)
 
 

@@ -179,10 +179,7 @@ def test_engines_with_own_steps_move_every_pair(name):
         pairs[key] = scene(joint=(A, C, second)), [scene(joint=(A, C))]
     pairs["a driver and a torsion spring"] = (
         scene(**DRIVEN_SPRUNG),
-        [
-            scene(driver=DRIVEN_SPRUNG["driver"]),
-            scene(load=DRIVEN_SPRUNG["load"]),
-        ],
+        [scene(driver=DRIVEN_SPRUNG["driver"]), scene(load=DRIVEN_SPRUNG["load"])],
     )
     pairs["two drivers"] = scene(driver=TWO_DRIVERS), [scene(driver=(driver,)) for driver in TWO_DRIVERS]
     served = {pair: both for pair, (both, _) in pairs.items() if engine(name).cannot(both) is None}

@@ -21,12 +21,7 @@ from tests.crosscheck.measured import MARGIN
 
 ENGINES = ("mujoco", "pinocchio", "exudyn")
 # largest error of accelerations on 124 mechanisms, times their distance to a singular position
-MEASURED = {
-    "mujoco": 4.8e-10,
-    "pinocchio": 1.7e-13,
-    "exudyn": 2.1e-8,
-    PRINCIPLE: 9.3e-14,
-}
+MEASURED = {"mujoco": 4.8e-10, "pinocchio": 1.7e-13, "exudyn": 2.1e-8, PRINCIPLE: 9.3e-14}
 MANY = range(200)
 SOME = (1, 3, 9, 10, 15, 16)  # every joint type, one to three loops; the last is near a singular position
 

@@ -80,10 +80,7 @@ PLANTED = {
         lambda t: of_other(SPRUNG, body=lighter("lower", 0.9)),
         "mass and inertia of body 'lower' times 0.9",
     ),
-    "missing body": (
-        lambda t: of_other(SPRUNG, body=lighter("upper", 1e-3)),
-        "body 'upper' has no mass",
-    ),
+    "missing body": (lambda t: of_other(SPRUNG, body=lighter("upper", 1e-3)), "body 'upper' has no mass"),
 }
 
 

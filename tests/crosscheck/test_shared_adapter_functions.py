@@ -14,15 +14,7 @@ from crosscheck.engines.shared.geometry import in_body, point_in_body
 from crosscheck.engines.shared.sampling import Counts, Failed, Sample, run_through
 from crosscheck.refusals import Owner
 from mbref.motions.trajectory import Outcome
-from mbref.scene import (
-    Body,
-    Factor,
-    Force,
-    Moment,
-    Revolute,
-    Scene,
-    Sine,
-)
+from mbref.scene import Body, Factor, Force, Moment, Revolute, Scene, Sine
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 HALF = math.sqrt(0.5)
