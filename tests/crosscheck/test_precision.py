@@ -28,7 +28,7 @@ def rounded(array: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ARRAYS)
 def test_array_in_single_precision_is_named(bench, name):
-    """The exact run of the bench has one array rounded to single precision; without it none is named."""
+    """One array of the judge's exact run is rounded to single precision; of the exact run none is named."""
     single = replace(bench.close, **{name: rounded(getattr(bench.close, name))})
     named = {item.partition(" of ")[0] for item in single_precision(bench.scene, single)}
     assert named == {name.replace("_", " ")}, named
@@ -36,20 +36,23 @@ def test_array_in_single_precision_is_named(bench, name):
 
 
 def test_reaction_in_single_precision_is_named_with_its_joint(bench):
+    """The wrenches of joint J are rounded to single precision."""
     wrenches = bench.close.reactions.items()
     single = replace(bench.close, reactions={n: rounded(w) if n == "J" else w for n, w in wrenches})
     assert single_precision(bench.scene, single) == ["reaction in J"]
 
 
 def test_noise_of_velocities_in_single_precision_is_measured(bench):
-    """Single precision rounds by up to 2⁻²⁴ = 6e-8 of a number; the exact run has only double rounding."""
+    """Single precision rounds by up to 2⁻²⁴ = 6e-8 of a number, and by less on average; the exact run has
+    only double rounding."""
     noise, of = grain(bench.scene, replace(bench.close, velocity=rounded(bench.close.velocity)))
     assert 1e-9 < noise < 1e-7 and of == "velocities", (noise, of)
     assert grain(bench.scene, bench.close)[0] < 1e-14
 
 
 def test_quaternions_of_alternating_sign_are_no_noise(bench):
-    """q and -q are one orientation: samples may alternate between them. The noise is the exact run's."""
+    """q and -q are one orientation: samples may alternate between them. The noise is double rounding, as of
+    the exact run."""
     signs = np.resize([1.0, -1.0], (len(bench.close.times), 1, 1))
     run = replace(bench.close, orientation=bench.close.orientation * signs)
     assert grain(bench.scene, run)[0] < 1e-14
@@ -65,6 +68,7 @@ def test_constant_simple_and_tiny_numbers_do_not_count_as_single_precision(bench
 
 
 def test_arrays_that_are_not_finite_are_named(bench):
+    """Velocities of the exact run become infinite, and the wrenches of joint J NaN."""
     wrench = np.full_like(bench.close.reactions["J"], np.nan)
     lost = replace(bench.close, reactions={"J": wrench}, velocity=np.full_like(bench.close.velocity, np.inf))
     assert not_finite(lost) == ["velocity", "reaction in J"]
@@ -72,7 +76,8 @@ def test_arrays_that_are_not_finite_are_named(bench):
 
 def test_engine_that_claims_single_precision_is_not_failed_for_it():
     """Velocities are rounded to single precision. An engine that claims double precision (2⁻⁵²) fails the
-    checks of digits and of smoothness; one that claims single precision (2⁻²³) does not."""
+    checks of digits and of smoothness; for one that claims single precision (2⁻²³) the check of digits does
+    not apply, and that of smoothness passes."""
     faulty = engine(DEFECTS["velocities rounded to single precision"])
     for claimed, digits, is_failed in ((2.0**-52, suite.FAIL, True), (2.0**-23, suite.OUTSIDE, False)):
         type(faulty).rounding = claimed

@@ -36,7 +36,7 @@ def moved(sample: int, body: int, by: tuple[float, float, float], k: int = 3) ->
 
 
 def test_energy_measure_is_the_largest_change_in_joule():
-    """2 kg at 3 m/s have 9 J; 3 kg higher by 0.1 m have 3 J."""
+    """2 kg at 3 m/s have 9 J; 3 kg higher by 0.1 m, at g = 10 m/s², have 3 J; at rest nothing changes."""
     fast = at_rest()
     fast.velocity[2, 0] = (0.0, 3.0, 0.0)
     assert measures.energy(SCENE, fast, None) == pytest.approx(9.0)
@@ -45,8 +45,9 @@ def test_energy_measure_is_the_largest_change_in_joule():
 
 
 def test_distance_measures_compare_a_centre_with_the_truth():
-    """Body "far" is 5 m from the origin, and off by 0.5 m at one of three samples: largest distance, distance
-    over 5 m, and root mean square. A truth that ends earlier judges only its own samples."""
+    """Body "far" is 5 m from the origin, and off by 0.5 m at one of three samples: largest distance 0.5 m,
+    over 5 m 0.1, and root mean square 0.5 m / √3. A truth that ends earlier judges only its own samples;
+    without a truth or samples there is no measure (None)."""
     off, true = moved(1, 1, (0.3, 0.0, 0.4)), at_rest()
     assert measures.distance("far")(SCENE, off, true) == pytest.approx(0.5)
     assert measures.distance("arm")(SCENE, off, true) == 0.0
@@ -59,7 +60,8 @@ def test_distance_measures_compare_a_centre_with_the_truth():
 
 
 def test_relative_measure_is_the_largest_over_all_observed_numbers():
-    """2 m is off by 0.02 m: 0.01. 1e-5 m is off by 3e-5 m: 0.03, over the least denominator 1e-3 m."""
+    """2 m is off by 0.02 m: 0.01. 1e-5 m is off by 3e-5 m: 0.03, over the least denominator 1e-3 m. Samples
+    that the truth lacks do not count."""
 
     def first(motion: Trajectory) -> np.ndarray:
         return motion.position[:, :, 0]
@@ -75,8 +77,8 @@ def test_relative_measure_is_the_largest_over_all_observed_numbers():
 
 
 def test_end_measure_is_the_largest_relative_error_of_the_last_sample():
-    """x is off by 0.25 of 1 m and y by 2 of 4 m at the end; earlier samples do not count. Without a truth at
-    the end there is no measure."""
+    """x is off by 0.25 of 1 m and y by 2 of 4 m at the end, or x by 1.75 of -1 m; earlier samples do not
+    count. Without a truth at the end there is no measure (None)."""
 
     def seen(scene: Scene, motion: Trajectory) -> dict[str, float]:
         return {"x": float(motion.position[-1, 0, 0]), "y": float(motion.position[-1, 1, 1]), "z": 1.0}

@@ -47,8 +47,8 @@ def held(
 
 
 def test_resume_repeats_no_test_that_passed_before(tmp_path):
-    """A sound engine passes; then it loses its gravity. With --resume its stored pass counts, and without it
-    the suite fails."""
+    """A sound engine passes the probe of free fall; then its file loses gravity. With --resume the stored
+    pass counts and no test fails; without it the suite fails (exit status 1)."""
     (tmp_path / "spatial_engine.py").write_text(SOURCE.read_text())
     first = held(tmp_path, "free_fall")
     assert first.returncode == 0 and " passed" in first.stdout, first.stdout[-1500:] + first.stderr[-500:]
@@ -70,6 +70,7 @@ def test_plugin_finds_an_engine_of_the_working_directory_in_child_processes(tmp_
     [("no_such_module:ENGINE", "No module named 'no_such_module'"), ("nothing", "unknown engine 'nothing'")],
 )
 def test_unknown_engine_is_a_usage_error_before_any_test(tmp_path, name, says):
+    """The message has the option, its value and the reason."""
     run = held(tmp_path, "free_fall", name=name)
     assert run.returncode == pytest.ExitCode.USAGE_ERROR, run.stdout[-1500:]
     assert f"--engine {name}: " in run.stderr and says in run.stderr, run.stderr

@@ -1,4 +1,4 @@
-"""Random loop mechanisms: initial accelerations of engines and of Gauss's principle / mbref's."""
+"""Random loop mechanisms: mbref's initial accelerations / those of engines and of Gauss's principle."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import pytest
 from crosscheck.conformance.initial_accelerations import PRINCIPLE, Comparison, compare
 from crosscheck.conformance.mechanisms import random_scenes
 from crosscheck.conformance.mechanisms.random_mechanisms import KINDS, random_mechanism
-from crosscheck.judge.constraints import closure, closure_rates, initial_poses, initial_twists
 from crosscheck.judge.gauss_motion import gauss_motion
 from mbref import simulate
 from mbref.motions.trajectory import Outcome
@@ -42,20 +41,20 @@ def excess(seeds: Sequence[int]) -> float:
 
 
 def test_engines_accelerate_six_random_mechanisms_as_mbref():
-    """Initial accelerations, also by Gauss's principle; every joint type, one to three loops."""
-    scenes = list(map(random_mechanism, SOME))
-    assert {joint.type for scene in scenes for joint in scene.joint} == set(KINDS)
-    assert {len(scene.joint) - len(scene.body) for scene in scenes} == {1, 2, 3}
+    """Initial accelerations by three engines and by Gauss's principle; every joint type, one to three loops.
+    MEASURED has the differences, which grow near a singular position; 10 times as much is allowed."""
     assert excess(SOME) <= 1
 
 
 @pytest.mark.slow
 def test_engines_accelerate_many_random_mechanisms_as_mbref():
-    """Initial accelerations, also by Gauss's principle."""
+    """Initial accelerations of 200 mechanisms by three engines and by Gauss's principle, within 10 times
+    MEASURED."""
     assert excess(MANY) <= 1
 
 
 def test_random_mechanisms_have_every_joint_type_and_up_to_three_loops():
+    """Of 40 seeds; 3 to 8 bodies. A loop is a joint more than a tree of the bodies on the ground has."""
     scenes = [random_mechanism(seed) for seed in range(40)]
     kinds = Counter(joint.type for scene in scenes for joint in scene.joint)
     assert set(kinds) == set(KINDS), f"no {set(KINDS) - set(kinds)}"
@@ -64,29 +63,12 @@ def test_random_mechanisms_have_every_joint_type_and_up_to_three_loops():
     assert sizes == set(range(3, 9)) and loops == {1, 2, 3}, (sizes, loops)
 
 
-def test_random_initial_states_satisfy_the_joints():
-    """Residuals of joints and of their rates are rounding; the given velocities stay and are not all zero."""
-    for scene in map(random_mechanism, MANY[:20]):
-        pose, rates = initial_poses(scene), initial_twists(scene)
-        off = max(np.abs(rows).max() for rows in closure(scene, 0.0, *pose).values())
-        drift = max(np.abs(rows).max() for rows in closure_rates(scene, 0.0, *pose, *rates).values())
-        given = np.array([body.velocity for body in scene.body])
-        kept = np.abs(rates[0] - given).max()
-        assert max(off, drift, kept) < 1e-12, (scene.name, off, drift, kept)
-        assert np.abs(given).max() > 0.01, f"{scene.name} rests"
-
-
-def test_seed_determines_the_random_mechanism():
-    assert random_mechanism.__wrapped__(7) == random_mechanism.__wrapped__(7)
-    assert random_mechanism(7) != random_mechanism(8)
-
-
 LOADED = range(4, 40, 5)  # seeds of mechanisms with loads of joints and over time
 
 
 def test_random_scenes_have_every_load_type_and_functions_of_time():
-    """Seeds 4, 9, 14, … have loads of joints and over time, two loads on some joint; seeds 0 to 3 have none
-    over time."""
+    """Seeds 4, 9, 14, … have loads of joints, two of them on one joint, and loads times a polynomial and
+    sine; seeds 0 to 3 have none over time."""
     scenes = [random_scenes.mechanism(seed) for seed in LOADED]
     loads = [load for scene in scenes for load in scene.load]
     assert {load.type for load in loads} == set(LOAD_TYPES)
@@ -100,15 +82,16 @@ def test_random_scenes_have_every_load_type_and_functions_of_time():
 
 @pytest.mark.parametrize("seed", LOADED)
 def test_mbref_accelerates_random_joint_loads_by_gauss_s_principle(seed):
-    """The principle uses the judge's equations; MEASURED is relative to the distance from singular."""
+    """Gauss's principle uses the judge's own equations. MEASURED has the difference, which grows near a
+    singular position; 10 times as much is allowed."""
     found = compare(random_scenes.mechanism(seed), ())
     assert found.errors[PRINCIPLE] <= MARGIN * MEASURED[PRINCIPLE] / found.distance
 
 
 @pytest.mark.parametrize("seed", [2, 7])
 def test_mbref_moves_tables_and_switched_loads_as_the_judge(seed):
-    """Two methods against the judge's integration; loads begin and end within the motion, and move bodies by
-    over 0.1 mm."""
+    """Two methods against the judge's integration of Gauss's principle, to 1e-9 m; loads begin and end within
+    the motion, and without these loads it is over 0.1 mm away."""
     scene = random_scenes.with_loads_of_joints(random_scenes.mechanism(seed), seed, switched=True)
     assert all(
         load.factor.table and load.factor.start and load.factor.stop for load in scene.load if load.over_time

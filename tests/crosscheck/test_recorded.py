@@ -88,8 +88,8 @@ PLANTED = {
     ("tolerance", "right"), [(FLOOR, (True, False)), (2e-8, (True, True)), (0.0, (False, False))]
 )
 def test_column_is_right_within_the_tolerance_of_its_scale(table, tolerance, right):
-    """Errors: 0.9e-8 of the mechanism's length in a position, 1.9e-8 of the largest angular velocity in a
-    rate. FLOOR is 1e-8. Of right columns no begin of an error is stated."""
+    """Errors put in: 0.9e-8 of the mechanism's length in a position, 1.9e-8 of the largest angular velocity
+    in a rate. FLOOR, the default tolerance, is 1e-8. A right column has no time at which its error begins."""
     spin = max(abs(table[f"{b}.angular_velocity.{a}"]).max() for b in ("upper", "lower") for a in "xyz")
     errors = {"upper.position.x": 0.9e-8 * scene_length(SCENE), "upper.angular_velocity.z": 1.9e-8 * spin}
     once = np.arange(len(TIMES)) == 40  # one sample of a column, for which no explanation is searched
@@ -102,7 +102,8 @@ def test_column_is_right_within_the_tolerance_of_its_scale(table, tolerance, rig
 @pytest.mark.slow  # references of changed scenes, which take seconds
 @pytest.mark.parametrize("name", PLANTED)
 def test_planted_difference_is_the_first_explanation(name, table):
-    """It leaves less than 1e-3 of the difference between recorded motion and reference."""
+    """PLANTED has the change of the scene whose motion is recorded, and the sentence. With the change in the
+    scene, less than 1e-3 of the difference between recorded motion and reference remains."""
     plant, says = PLANTED[name]
     found = judge_motion(SPRUNG if name in ("mass", "missing body") else SCENE, plant(table))
     assert not found.is_right
@@ -111,9 +112,10 @@ def test_planted_difference_is_the_first_explanation(name, table):
 
 
 @pytest.mark.slow
-def test_motion_of_a_weightless_body_has_no_explanation():
-    """The recorded motion has a body of 1e-5 of its mass; fits of changes leave the range of numbers."""
-    assert not judge_motion(SPRUNG, of_other(SPRUNG, body=lighter("lower", 1e-5))).explanations
+def test_motion_of_a_weightless_body_is_wrong_and_has_no_explanation():
+    """The recorded motion has a body of 1e-5 of its mass, to which no searched change leads."""
+    found = judge_motion(SPRUNG, of_other(SPRUNG, body=lighter("lower", 1e-5)))
+    assert not found.is_right and not found.explanations
 
 
 PAIRS = {
@@ -131,7 +133,8 @@ PAIRS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PAIRS)
 def test_two_planted_differences_are_the_first_explanation(name, table):
-    """The first explanation names both, and leaves less than 1e-3 of the difference."""
+    """PAIRS has two changes of columns, and the words for each. The first explanation names both; with them
+    less than 1e-3 of the difference remains."""
     plant, says = PAIRS[name]
     (first, *_) = judge_motion(SCENE, plant(table)).explanations
     assert all(sentence in first.sentence for sentence in says), first.sentence
@@ -167,7 +170,8 @@ def test_tables_in_other_units_and_orders_are_judged_right(table, tmp_path):
 
 
 def test_factor_of_every_unit_is_the_product_of_its_parts():
-    """Parts of "mm/s^2" are a prefix, a name and a power of a second; "Nmm" has two names."""
+    """A unit's part is a name with or without a prefix m, c, k or u: "N mm" has two parts. Units of time in
+    the denominator are seconds, whose factor is 1."""
     names = {"m": 1, "s": 1, "N": 1, "W": 1, "J": 1, "rad": 1, "1": 1, "in": 0.0254, "ft": 0.3048, "min": 60}
     names |= {"deg": np.pi / 180, "rev": 2 * np.pi, "rpm": 2 * np.pi / 60}
     names |= {
@@ -191,24 +195,31 @@ def test_factor_of_every_unit_is_the_product_of_its_parts():
     ],
 )
 def test_faulty_table_is_refused_with_its_fault(text, columns, says, tmp_path):
+    """The table's text, the columns of the request, and a part of the error."""
     (tmp_path / "faulty.csv").write_text(text)
     with pytest.raises(SceneError, match=says):
         read(tmp_path / "faulty.csv", SCENE, columns)
 
 
 def test_reference_command_writes_a_table_that_judge_finds_right(tmp_path, capsys):
-    """Exit status 0 for a right table, 1 for a wrong one (quaternions read in another order), 2 for options,
-    columns or files that cannot be read."""
+    """Exit status 0; read with quaternions in another order the table is wrong: exit status 1, and the
+    explanation names this order."""
     SCENE.save(tmp_path / "s.toml")
     scene, out = str(tmp_path / "s.toml"), str(tmp_path / "ref.csv")
     assert main(["reference", scene, "--out", out, "--samples", "81"]) == 0
     assert "81 samples to t = 0.4 s, error at most" in capsys.readouterr().out
     assert main(["judge", scene, out]) == 0
-    for wrong in ("-1", "x"):
-        with pytest.raises(SystemExit, match="2"):
-            main(["judge", scene, out, "--tolerance", wrong])
     assert main(["judge", scene, out, "--quaternion", "xyzw"]) == 1
     printed = capsys.readouterr().out
     assert " off " in printed and "[bold]" not in printed and "quaternions in the order" in printed
-    assert main(["judge", scene, str(tmp_path / "none.csv")]) == 2
-    assert main(["judge", scene, out, "--column", "upper"]) == 2
+
+
+def test_judge_command_ends_with_status_2_for_what_it_cannot_read(tmp_path):
+    """A tolerance that is negative or no number, a column without a number, a file that does not exist."""
+    SCENE.save(tmp_path / "s.toml")
+    (tmp_path / "t.csv").write_text("time,upper.x\n0,1\n")
+    judge, scene = ["judge", str(tmp_path / "s.toml")], str(tmp_path / "t.csv")
+    for wrong in ("-1", "x"):
+        with pytest.raises(SystemExit, match="2"):
+            main([*judge, scene, "--tolerance", wrong])
+    assert main([*judge, str(tmp_path / "none.csv")]) == main([*judge, scene, "--column", "upper"]) == 2

@@ -62,7 +62,9 @@ def replayed(*moments: float, **parts: Any) -> Scene | Outside:
 
 @pytest.mark.parametrize("size", [4.0, -4.0])
 def test_constant_driving_moment_replaces_the_driver(size):
-    """The axis has length 2; moments of ±4 N m vary by 0.9e-6 and the mean is taken. Other loads stay."""
+    """Moments of ±4 N m about z at two samples vary by 0.9e-6 (1e-6 is allowed): their mean acts in place of
+    the driver. The axis's length of 2 has no effect. Other loads stay; bodies start with the run's
+    velocities."""
     found = replayed(size, size * (1 + 0.9e-6), load=(Moment(body="c", moment=X),))
     assert [load.body for load in found.load] == ["c", "b"] and not found.driver
     assert found.load[1].moment == pytest.approx((0.0, 0.0, size * (1 + 0.45e-6)), rel=1e-9)
@@ -70,7 +72,8 @@ def test_constant_driving_moment_replaces_the_driver(size):
     assert [body.angular_velocity for body in found.body] == [(0.0, 0.0, 0.5), (0.0, 0.0, 0.0)]
 
 
-def test_replayed_scene_starts_with_the_velocities_of_the_first_sample():
+def test_replayed_scene_starts_with_the_angular_velocities_of_the_first_sample():
+    """The run's samples have different ones."""
     spin = np.arange(12.0).reshape(2, 2, 3)
     run = motion(angular_velocity=spin, reactions={"crank": np.ones((2, 6))})
     found = replays.replayed(scene(joint=(SHAFT, CRANK), driver=(DRIVER,)), run)
@@ -79,10 +82,12 @@ def test_replayed_scene_starts_with_the_velocities_of_the_first_sample():
 
 @pytest.mark.parametrize("size", [4.0, -4.0])
 def test_driving_moment_that_varies_by_over_1e_6_is_refused(size):
+    """Moments at two samples differ by 1.1e-6 of themselves."""
     assert "varies" in replayed(size, size * (1 + 1.1e-6)).reason
 
 
-def test_driver_without_a_moment_is_replaced_by_zero():
+def test_driver_without_a_moment_is_replaced_by_a_moment_of_zero():
+    """A variation relative to the moment's size does not exist then."""
     assert replayed(0.0, 0.0).load[-1].moment == (0.0, 0.0, 0.0)
 
 

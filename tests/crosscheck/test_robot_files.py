@@ -52,14 +52,8 @@ REFUSALS = (
     "the file has no such joint that moves",
     "which is not a single hinge or slide",
 )
-LASTING = {
-    "delta.urdf",
-    "delta.xml",
-    "gripper.xml",
-    "hexapod.xml",
-    "kangaroo_leg.xml",
-    "walker.xml",
-}  # CPU seconds
+SLOW = {"delta.urdf", "delta.xml", "gripper.xml", "hexapod.xml", "kangaroo_leg.xml", "walker.xml"}
+END, BRIEF = 0.05, 0.02  # s, of the compared motions
 
 
 def read(name: str) -> Source:
@@ -112,12 +106,13 @@ def test_robot_file_gives_its_freedoms_and_leaves_out_dampings_only(name):
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow) if n in LASTING else n for n in sorted(FREEDOMS)]
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in sorted(FREEDOMS)]
 )
 def test_scene_of_a_robot_file_moves_as_mujoco_s_model(name):
-    """MuJoCo's masses, forces and rows are integrated finely; loops missing in its model are added here."""
+    """The judge moves the scene; MuJoCo's masses, forces and rows of the file are integrated finely, and
+    loops that MuJoCo does not read are added to its model here."""
     found = read(name)
-    assert apart(original(name, found), found, 0.05) < SAME
+    assert apart(original(name, found), found, END) < SAME
 
 
 def test_error_of_1e_4_in_a_mass_or_armature_shows_in_the_motion():
@@ -128,7 +123,7 @@ def test_error_of_1e_4_in_a_mass_or_armature_shows_in_the_motion():
     for change, k in ((model.body_mass, model.body("foot").id), (model.dof_armature, rotor)):
         kept = float(change[k])
         change[k] = kept * 1.0001
-        assert apart(model, found, 0.02) > 100 * SAME
+        assert apart(model, found, BRIEF) > 100 * SAME
         change[k] = kept
 
 
@@ -143,7 +138,7 @@ def random_file_moves_alike(make, seed: int, folder: Path) -> bool:
         assert any(says in str(error) for says in REFUSALS), str(error)
         return False
     model = found.original if file.suffix == ".xml" else with_equalities(file.text, file.loops, file.mimics)
-    assert apart(model, found, 0.02) < SAME, (make.__name__, seed)
+    assert apart(model, found, BRIEF) < SAME, (make.__name__, seed)
     return True
 
 

@@ -56,8 +56,8 @@ def turned(name: str, digits: int | None) -> Scene:
 @pytest.mark.parametrize("digits", [6, 8])
 @pytest.mark.parametrize("name", LOOPS)
 def test_rounded_loop_is_closed_and_keeps_its_redundant_rows(name, digits):
-    """Both bodies of a joint get the rounded point and axis, so that it is closed; dependent rows stay
-    dependent up to rounding."""
+    """Both bodies of a joint get the rounded point and axis, so that it is closed to rounding. Rank and
+    redundant rows are those without rounding, and singular values beyond the rank are rounding."""
     scene, whole = turned(name, digits), turned(name, None)
     gaps = closure(scene, np.zeros(1), *(a[None] for a in initial_poses(scene)))
     assert max(np.abs(rows).max() for rows in gaps.values()) < 1e-14
@@ -73,7 +73,7 @@ def test_accelerations_change_by_the_rounding_of_the_file(name):
     whole = gauss(turned(name, None))
     apart = {d: np.abs(gauss(turned(name, d)) - whole).max() / np.abs(whole).max() for d in (6, 8)}
     assert 1e-8 < apart[6] < 1e-3 and 1e-10 < apart[8] < 1e-5, apart
-    assert 5 < apart[6] / apart[8] < 2000, apart
+    assert 100 / 20 < apart[6] / apart[8] < 100 * 20, apart
 
 
 @pytest.mark.parametrize("name", ["four_bar_gravity", "spatial_slider_crank_gravity"])
@@ -109,7 +109,8 @@ def test_run_that_ends_by_rounded_numbers_asks_for_twelve_digits():
 
 
 def test_singular_start_gets_no_advice_on_rounding():
-    """Also scenes with rows that are redundant, or dependent at the start, in full digits."""
+    """The scenes start in a singular position, or have redundant rows, in full digits: the advice is empty. A
+    scene of 6 digits gets it (test above)."""
     for name in ("four_bar_straight", "four_bar_gravity", "sarrus"):
         start = start_run(find_scene(name), Method.parse("taylor"), np.array([0.1]), Limits())
         assert advice_on_rounding(start) == "", name
