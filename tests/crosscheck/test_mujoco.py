@@ -14,7 +14,6 @@ from crosscheck.engine import Setting, engine
 from crosscheck.engines.mujoco.adapter import ENGINE
 from crosscheck.engines.mujoco.context import LIBRARIES, library
 from crosscheck.engines.mujoco.families import ADAPTIVE, HARD
-from crosscheck.engines.mujoco.model import compiled
 from crosscheck.judge.metrics import error_series, order_of_convergence, violation_series
 from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory
@@ -161,17 +160,6 @@ def test_run_that_blows_up_writes_no_file_and_prints_nothing(tmp_path, monkeypat
     run = simulate(SCENES["planar_slider_crank"](), 0.4, "tuned", step=4e-3, beta=2000.0, hard=HARD)
     assert run.outcome is Outcome.NOT_FINITE and list(tmp_path.iterdir()) == []
     assert tuple(capfd.readouterr()) == ("", "")
-
-
-def test_compiled_model_has_the_masses_and_moments_of_the_links() -> None:
-    """Mass (kg) and principal moments (kg m²) in MuJoCo's model are those of the links, to 1e-14, some
-    roundings of 2 kg."""
-    built = compiled(every_joint())
-    model, links = built.model, built.tree.links
-    for link, body in zip(links, built.links, strict=True):
-        moments = np.linalg.eigvalsh(link.inertia)
-        off = max(abs(model.body_mass[body] - link.mass), abs(model.body_inertia[body] - moments).max())
-        assert off < 1e-14, f"MuJoCo's body {body} is {off:.1e} kg or kg m² off its link"
 
 
 def test_thin_disc_whose_rounded_inertia_violates_the_triangle_inequality_moves_exactly() -> None:

@@ -9,7 +9,6 @@ from crosscheck.conformance.changes.rewritings import duplicated
 from crosscheck.conformance.mechanisms.moving import moving_probes
 from crosscheck.engine import Setting, engine
 from crosscheck.engines.pinocchio.adapter import ENGINE
-from crosscheck.engines.pinocchio.model import Loads, Mechanism
 from crosscheck.judge.metrics import violation_series
 from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory
@@ -88,29 +87,6 @@ def test_projection_keeps_the_branch_of_the_driven_four_bar() -> None:
     assert plain.outcome is Outcome.NOT_FINITE and plain.t_end > 0.0378, plain.message
 
 
-@pytest.mark.parametrize("name", [*PAPER, "every_joint"])
-def test_parents_come_before_children_in_pinocchio_s_model(name: str) -> None:
-    """Pinocchio's factorisation needs it, and its own check of the model passes."""
-    scene = every_joint() if name == "every_joint" else SCENES[name]()
-    model = Mechanism(scene).model
-    assert model.check(model.createData()), f"{name}: Pinocchio's own check of the order fails"
-    parents = list(model.parents)
-    assert all(p < k for k, p in enumerate(parents) if k), f"{name}: parents {parents}"
-
-
-def test_mass_matrix_by_composite_bodies_is_the_inverse_dynamics_one() -> None:
-    """Column k of M is τ(q, 0, e_k) - τ(q, 0, 0); a wrong order of the joints would make both differ."""
-    mechanism = Mechanism(every_joint())
-    model, q = mechanism.model, mechanism.q0
-    data = model.createData()
-    upper = pinocchio.crba(model, data, q)
-    composite = np.triu(upper) + np.triu(upper, 1).T
-    rest = pinocchio.rnea(model, data, q, np.zeros(model.nv), np.zeros(model.nv))
-    columns = [pinocchio.rnea(model, data, q, np.zeros(model.nv), e) - rest for e in np.eye(model.nv)]
-    apart = abs(composite - np.array(columns)).max()
-    assert apart < MARGIN * ROUNDING, f"mass matrices differ by {apart:.1e}"
-
-
 def test_first_sample_of_pinocchio_has_the_scene_s_poses() -> None:
     """Every joint type, by Pinocchio's kinematics at its initial coordinates."""
     scene = every_joint()
@@ -158,14 +134,6 @@ def kinetic(scene: Scene, run: Trajectory, k: int) -> float:
         spin = rotations.rotate(rotations.conjugate(run.orientation[k, b]), run.angular_velocity[k, b])
         energy += (body.mass * run.velocity[k, b] @ run.velocity[k, b] + spin**2 @ np.array(body.inertia)) / 2
     return energy
-
-
-def test_moment_about_a_fixed_axis_is_a_constant_joint_torque() -> None:
-    """The slider-crank's moment of 100 N m acts about the crank's axis; loads of ``every_joint``, forces at
-    points and springs, are no constant torques."""
-    loads = Loads(Mechanism(SCENES["planar_slider_crank"]()))
-    assert loads.fixed and loads.constant[0] == 100.0
-    assert not Loads(Mechanism(every_joint())).fixed
 
 
 def test_driver_beyond_the_slider_s_reach_ends_the_run_with_its_samples() -> None:

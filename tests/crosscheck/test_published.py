@@ -97,14 +97,6 @@ def test_no_two_published_problems_share_a_scene():
     assert set(FREEDOMS) <= set(BY_SCENE)
 
 
-def test_problem_names_its_scene_measure_source_and_sample_times():
-    """The scene can be found, texts are not empty, and the acceptance of the measure is positive."""
-    for problem in PUBLISHED.values():
-        assert find_scene(problem.scene).body
-        assert problem.words and problem.source and problem.acceptance > 0
-        assert len(problem.times()) == problem.samples
-
-
 def test_sarrus_platform_stays_level_and_on_its_line():
     """Sarrus' linkage guides its platform along the vertical z, without a tilt, to rounding; the platform
     falls by over 0.1 m in 0.3 s. The motion is the reference's."""

@@ -21,6 +21,7 @@ NAMES = {
     "translational": "prismatic",
     "fixed": "fixed",
 }
+ROUNDED = 1e-12  # m: some roundings of frames within 1 m
 LOOPS = ("four_bar_gravity", "five_bar_gravity", "spatial_slider_crank_gravity", "bennett", "sarrus")
 
 
@@ -105,29 +106,27 @@ def returned(scene, random, tmp_path) -> list:
     return [read(tmp_path, written(scene, random, nested)).scene for nested in (False, True)]
 
 
-def structure(scene) -> tuple:
-    """Return the types of the joints, and the rank of their rows."""
-    return [joint.type for joint in scene.joint], rank(scene)
-
-
-def gap(scene, found) -> float:
-    """Return the largest difference of a centre or an anchor (m), gap of a joint (m), or thousandth of the
-    difference of accelerations by Gauss's principle over the largest."""
+def assert_is_the_same_mechanism(scene, found) -> None:
+    """Types of joints and rank are equal; centres, anchors (m) and accelerations by Gauss's principle (of the
+    largest) are equal to rounding, and joints are closed (m)."""
+    assert [joint.type for joint in found.joint] == [joint.type for joint in scene.joint]
+    assert rank(found) == rank(scene)
     places = [
         np.array([*(b.position for b in each.body), *(x for j in each.joint for x in j.anchor_pair)])
         for each in (scene, found)
     ]
     open_by = max(np.abs(rows).max() for rows in closure(found, 0.0, *initial_poses(found)).values())
+    assert max(np.abs(places[0] - places[1]).max(), open_by) < ROUNDED
     off = np.abs(gauss(found) - gauss(scene)).max() / np.abs(gauss(scene)).max()
-    return max(np.abs(places[0] - places[1]).max(), open_by, off / 1000)
+    assert off < 1000 * ROUNDED  # the condition of the equations magnifies rounding
 
 
 @pytest.mark.parametrize("name", LOOPS)
 def test_loop_returns_from_sdf_in_random_frames(name, tmp_path):
-    """Random frames of models, links, joints and inertias."""
+    """The scene is written with random frames of models, links, joints and inertias, and read again."""
     scene = at_rest(SCENES[name]())
     for found in returned(scene, np.random.default_rng(len(name)), tmp_path):
-        assert structure(found) == structure(scene) and gap(scene, found) < 1e-12
+        assert_is_the_same_mechanism(scene, found)
 
 
 def random_scene(seed: int):
@@ -145,11 +144,13 @@ def random_scene(seed: int):
     "seeds", [range(5), pytest.param(range(5, 105), marks=pytest.mark.slow)], ids=["few", "many"]
 )
 def test_random_mechanisms_return_from_sdf_in_random_frames(seeds, tmp_path):
+    """Random mechanisms, most of them with three joints or more, are written in random frames and read
+    again."""
     scenes = [random_scene(seed) for seed in seeds]
+    assert sum(len(scene.joint) > 2 for scene in scenes) > len(scenes) / 2
     for seed, scene in zip(seeds, scenes, strict=True):
         for found in returned(scene, np.random.default_rng(seed), tmp_path):
-            assert structure(found) == structure(scene) and gap(scene, found) < 1e-12
-    assert sum(len(scene.joint) > 2 for scene in scenes) > len(scenes) / 2
+            assert_is_the_same_mechanism(scene, found)
 
 
 LINK = """<link name="{name}"><pose>{pose}</pose><inertial><pose>{centre} 0 0 0</pose><mass>0.5</mass>
@@ -173,6 +174,7 @@ DYNAMICS = (
 
 
 def test_dynamics_of_hinges_and_slides_become_springs(tmp_path):
+    """Stiffness, damping and natural angle or displacement are the file's (2, 0.1, 0.3)."""
     (spring,) = read(tmp_path, pair(more=DYNAMICS)).scene.load
     assert (spring.joint, spring.stiffness, spring.damping, spring.natural_angle) == ("B", 2.0, 0.1, 0.3)
     (slide,) = read(tmp_path, pair("prismatic", DYNAMICS)).scene.load
@@ -180,6 +182,7 @@ def test_dynamics_of_hinges_and_slides_become_springs(tmp_path):
 
 
 def test_mimic_joint_becomes_a_coupling_with_its_multiplier(tmp_path):
+    """Joint B mimics A with multiplier -2: q_B = -2 q_A."""
     mimic = '<mimic joint="A"><multiplier>-2</multiplier><offset>0</offset><reference>0</reference></mimic>'
     (coupling,) = read(tmp_path, pair(more=mimic)).scene.coupling
     assert (coupling.joints, coupling.ratio) == (("A", "B"), -2.0)
@@ -194,7 +197,7 @@ def test_screw_becomes_a_cylinder_with_a_coupled_displacement(tmp_path):
 
 
 def test_links_of_several_models_have_the_model_s_name_in_front(tmp_path):
-    """A static model is left out; its links are the ground."""
+    """Link a of model m is body "m::a". A second, static model is left out."""
     text = pair(link='<link name="lamp"/>').replace(
         "</model></sdf>",
         '</model><model name="floor"><static>true</static><link name="plate"/></model></sdf>',
@@ -264,11 +267,13 @@ def test_links_of_several_models_have_the_model_s_name_in_front(tmp_path):
     ],
 )
 def test_faulty_sdf_is_refused_with_the_element_s_name(text, says, tmp_path):
+    """The text of the file, and the element and fault that the error names."""
     with pytest.raises(SceneError, match=says.replace("(", r"\(")):
         read(tmp_path, text)
 
 
 def test_limits_and_friction_that_are_left_out_are_listed(tmp_path):
+    """A limit of a joint never acts in a scene; dry friction is left out by ``--without friction``."""
     more = "<limit><lower>-1</lower></limit><dynamics><friction>1</friction></dynamics>"
     found = read(tmp_path, pair(more=more), without=["friction"])
     assert any("1 limit of a joint" in part for part in found.left_out)
@@ -276,6 +281,7 @@ def test_limits_and_friction_that_are_left_out_are_listed(tmp_path):
 
 
 def test_keyframe_of_an_sdf_file_is_refused(tmp_path):
+    """SDF has no keyframes: option ``--keyframe`` is an error that says where poses are."""
     with pytest.raises(SceneError, match="an SDF file gives the poses"):
         read(tmp_path, pair(), keyframe="home")
 
@@ -318,6 +324,7 @@ def test_axes_before_version_1_5_are_given_in_the_model_s_frame(version, axis, t
 
 
 def test_link_named_ground_is_renamed(tmp_path):
+    """ "ground" is the fixed body of every scene; the link becomes "link ground", also in its joints."""
     scene = read(tmp_path, pair().replace('"a"', '"ground"').replace(">a<", ">ground<")).scene
     assert [body.name for body in scene.body] == ["link ground", "b"]
     assert scene.joint_named("B").bodies == ("link ground", "b")

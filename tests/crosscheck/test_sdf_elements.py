@@ -1,4 +1,4 @@
-"""SDF files read / one link or joint each, with every number and sentence worked out by hand."""
+"""SDF files of one link and joint / bodies, joints and sentences worked out by hand."""
 
 from __future__ import annotations
 
@@ -36,7 +36,8 @@ def hinge(more: str = "", kind: str = "revolute", ends: str = "", name: str = "j
 
 # --- Links ------------------------------------------------------------------------------------------------
 def test_link_becomes_a_body_with_its_inertial_pose_and_moments(tmp_path: Path) -> None:
-    """The inertial pose moves the centre and turns the moments by a quarter turn about z."""
+    """The link, at (1, 2, 3), and its inertial frame, 0.5 m along the link's x axis, are each turned by a
+    quarter turn about z: the centre is at (1, 2.5, 3), and the moments about x and y are exchanged."""
     moved = MASS.replace("<inertial>", f"<inertial><pose>0.5 0 0 0 0 {math.pi / 2!r}</pose>")
     link = f'<link name="b"><pose>1 2 3 0 0 {math.pi / 2!r}</pose>{moved}</link>'
     [body] = read(tmp_path, link).scene.body
@@ -72,6 +73,7 @@ def test_links_without_inertial_and_worlds_without_gravity_get_sdf_s_defaults(tm
 def test_link_element_that_changes_the_motion_is_refused_or_left_out(
     old: str, new: str, kind: str, sentence: str, tmp_path: Path
 ) -> None:
+    """The error and the list of what is left out name the element, the link and the option ``--without``."""
     with pytest.raises(
         SceneError, match=f"{sentence}: it changes the motion; --without {kind} leaves it out"
     ):
@@ -83,6 +85,7 @@ def test_link_element_that_changes_the_motion_is_refused_or_left_out(
 # --- Joints -----------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("kind", ["revolute", "prismatic", "ball", "fixed", "universal", "continuous"])
 def test_joint_lies_at_its_child_with_its_axes(kind: str, tmp_path: Path) -> None:
+    """The child link is at (1, 2, 3) and not turned; axis is z, and axis2 of a universal joint x."""
     found = read(tmp_path, LINK + hinge(kind=kind, axes="axis axis2" if kind == "universal" else "axis"))
     [joint] = found.scene.joint
     assert joint.bodies == ("ground", "b") and joint.anchor_pair[0] == (1.0, 2.0, 3.0)
@@ -109,13 +112,15 @@ DYNAMICS = (
 
 
 def test_friction_of_a_hinge_is_left_out_on_request_and_its_spring_stays(tmp_path: Path) -> None:
+    """The hinge has dry friction 7 N m and a spring of 3 N m/rad."""
     rough = DYNAMICS.replace("<friction>0", "<friction>7")
     found = read(tmp_path, LINK + hinge(rough), without=["friction"])
     assert found.left_out == ("dry friction of joint 'j' (--without friction)",)
-    assert len(found.scene.load) == 1
+    assert [(load.type, load.stiffness) for load in found.scene.load] == [("torsion_spring", 3.0)]
 
 
 def test_damping_and_spring_of_a_ball_joint_are_refused_by_name(tmp_path: Path) -> None:
+    """A scene has springs and dampers of hinges and slides only; the error lists both faults."""
     with pytest.raises(SceneError) as refused:
         read(tmp_path, LINK + hinge(DYNAMICS, "ball"))
     causes = [fault.partition(":")[0] for fault in refused.value.faults]
@@ -123,11 +128,13 @@ def test_damping_and_spring_of_a_ball_joint_are_refused_by_name(tmp_path: Path) 
 
 
 def test_damping_of_a_ball_joint_is_left_out_on_request(tmp_path: Path) -> None:
-    damped = DYNAMICS.replace(">3<", ">0<")  # no stiffness
+    """The option is ``--without damping``; the joint has no stiffness."""
+    damped = DYNAMICS.replace(">3<", ">0<")
     found = read(tmp_path, LINK + hinge(damped, "ball"), without=["damping"])
     assert found.left_out == ("damping of joint 'j' (--without damping)",)
 
 
 def test_export_of_sdf_is_refused_with_a_format_that_works(tmp_path: Path) -> None:
+    """Scenes are read from SDF but not written; MJCF (.xml) is named instead."""
     with pytest.raises(SceneError, match=r"SDF: is read only; export as \.xml"):
         reading.FORMAT.write(read(tmp_path, LINK).scene)

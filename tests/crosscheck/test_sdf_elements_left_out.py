@@ -40,6 +40,8 @@ def test_included_model_has_the_axes_of_its_own_version(uri, version, axis, tmp_
 
 
 def test_sdf_path_finds_an_included_model_with_its_own_pose(tmp_path, monkeypatch):
+    """Environment variable SDF_PATH names the folder of models; the include has no pose, and the model's own
+    is 7 m along y, so that the link's centre of mass is at (0.1, 7, 0)."""
     (tmp_path / "models" / "finger").mkdir(parents=True)
     (tmp_path / "models" / "finger" / "model.sdf").write_text(finger("1.7"))
     monkeypatch.setenv("SDF_PATH", str(tmp_path / "models"))
@@ -48,6 +50,7 @@ def test_sdf_path_finds_an_included_model_with_its_own_pose(tmp_path, monkeypatc
 
 
 def test_included_sun_and_ground_plane_are_left_out(tmp_path):
+    """These models of Gazebo's library have no moving link and need not be on the disk."""
     still = "".join(f"<include><uri>{uri}</uri></include>" for uri in ("model://sun", "model://ground_plane"))
     text = pair().replace("<model", f'<world name="w">{still}<model').replace("</sdf>", "</world></sdf>")
     assert [body.name for body in read(tmp_path, text).scene.body] == ["a", "b"]
@@ -81,5 +84,6 @@ def test_gearbox_turns_its_child_by_minus_ratio_times_the_parent(sense, swapped,
 
 
 def test_gearbox_without_hinges_on_its_reference_body_is_refused(tmp_path):
+    """The gearbox's parent is its reference body itself, so that no hinge between both exists."""
     with pytest.raises(SceneError, match="joint 'G': a gearbox needs a hinge along its axis between 'frame'"):
         read(tmp_path, gears(parent="frame", child="one"))

@@ -47,7 +47,8 @@ def test_world_vectors_and_points_are_given_in_a_body_s_axes():
 
 
 def test_switched_and_tabulated_loads_are_refused_for_steps_that_cannot_end_there():
-    """A factor that is smooth over the motion needs no end of a step."""
+    """A step has to end where a factor over time is switched on or passes a point of its table, at 0.5 s or 1
+    s of the 2 s; a factor with a sine is smooth and needs no end of a step."""
     table = Factor(table=((0.0, 0.0), (1.0, 1.0), (2.0, 3.0), (3.0, 4.0)))
     smooth = Moment(body="b", moment=Z, factor=Factor(sine=Sine(amplitude=1.0)))
     switched = Force(body="b", point=X, force=Z, factor=Factor(start=0.5))
@@ -107,5 +108,6 @@ def test_compiler_is_the_environment_variable_s_or_the_first_installed(monkeypat
 
 
 def test_compiler_that_cannot_be_started_is_reported():
+    """The program does not exist; the error says which compiler could not be run."""
     with pytest.raises(NoLibrary, match="the C compiler could not be run"):
         Compiler("C", "CC", ()).run(["/nowhere/compiler"])

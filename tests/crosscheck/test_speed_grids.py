@@ -1,4 +1,4 @@
-"""The settings and the words of the speed comparison; no time is measured."""
+"""Settings, groups and sentences of the speed comparison in ``benchmarks``; no time is measured."""
 
 from __future__ import annotations
 
@@ -48,6 +48,8 @@ def test_speed_comparison_assigns_families_to_their_integrators(monkeypatch: pyt
 
 
 def test_speed_grid_recognises_scenes_with_singular_positions(grids):
+    """Crank and rod of the heavy slider-crank are equal, so that it crosses them; of the other they are
+    not."""
     assert grids.passes_singular_position(SCENES["planar_slider_crank_heavy"]())
     assert not grids.passes_singular_position(SCENES["planar_slider_crank_gravity"]())
 
@@ -64,6 +66,8 @@ def test_family_that_misses_a_level_by_little_is_named(grids):
 
 
 def test_integrated_families_are_families_of_their_engine():
+    """Families that crosscheck integrates (``integrated_here``) are listed among the engine's; MuJoCo's by
+    name."""
     named = {name: set(engine(name).integrated_here) for name in engine_names()}
     assert named["mujoco"] == {"forward", "projected", *COMPILED}
     for name, families in named.items():

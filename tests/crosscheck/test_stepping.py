@@ -64,8 +64,8 @@ def test_noise_in_one_stage_of_the_shortest_step_is_stepped_over() -> None:
 
 
 def test_noise_where_a_shortest_step_is_corrected_does_not_spoil_the_result() -> None:
-    """y' = 1, except for 1e9 just where the first, shortest step is corrected, by 1e-9; the sum of the
-    corrections and the time is y(1)."""
+    """y' = 1, except for 1e9 just where the first, shortest step is corrected. Each step is corrected by
+    1e-9: y(1) is 1 and 1e-9 a step, to rounding."""
     shortest, moved = 1e-3, 1e-9
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
@@ -78,11 +78,14 @@ def test_noise_where_a_shortest_step_is_corrected_does_not_spoil_the_result() ->
 
 
 def test_failed_correction_of_a_state_ends_the_run_with_its_reason() -> None:
+    """The correction after a step raises Failed with outcome NOT_CONVERGED and "no way"; so does the run."""
+
     def refuse(t: float, y: np.ndarray) -> np.ndarray:
         raise Failed(Outcome.NOT_CONVERGED, t, "no way")
 
-    with pytest.raises(Failed, match="no way"):
+    with pytest.raises(Failed, match="no way") as failure:
         Adaptive(oscillator, refuse, 1e-6, 1e-3, np.inf, Counts()).advance(cosine(0.0), 0.0, 1.0)
+    assert failure.value.outcome is Outcome.NOT_CONVERGED
 
 
 def test_noisy_step_a_little_longer_than_the_shortest_ends() -> None:
@@ -100,7 +103,7 @@ def test_noisy_step_a_little_longer_than_the_shortest_ends() -> None:
 
 
 def test_motion_that_is_not_finite_after_half_a_second_fails_there() -> None:
-    """y' = 1 + 0 · √(0.5 - t)."""
+    """y' = 1 + 0 · √(0.5 - t) is NaN from t = 0.5 s on; the last finite state is within 0.05 s before it."""
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
         with np.errstate(all="ignore"):

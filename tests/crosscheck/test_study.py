@@ -31,6 +31,7 @@ def case(family: str, fake: str = "FAKE", scene: Scene | None = None, limit: flo
 
 
 def test_record_of_a_study_holds_the_engine_s_trajectory():
+    """Read back from JSON it is the trajectory of a run here; the record also identifies case and machine."""
     wanted = case("a")
     [record] = study([wanted], ThreadPoolExecutor(1))
     there = Trajectory.from_record("still", json.loads(json.dumps(record)))
@@ -97,7 +98,7 @@ def test_case_that_timed_out_is_repeated_only_with_a_longer_limit(tmp_path: Path
 
 @pytest.fixture(scope="module")
 def one_after_the_other() -> list[dict]:
-    """Records of EVERYWHERE in this process, one at a time."""
+    """Records of everywhere() in this process, one at a time."""
     with ThreadPoolExecutor(1) as one:
         return study(everywhere(), one)
 
@@ -110,6 +111,7 @@ def everywhere() -> list[Case]:
 
 
 def test_process_pool_gives_the_records_of_a_serial_study(one_after_the_other: list[dict]):
+    """Except for times and seconds; one of the three cases crashes."""
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         records = study(everywhere(), pool)
     assert untimed(records) == untimed(one_after_the_other)
@@ -117,7 +119,7 @@ def test_process_pool_gives_the_records_of_a_serial_study(one_after_the_other: l
 
 
 def test_run_in_a_child_gives_the_record_of_a_run_here():
-    """Except for the estimate of the error, which only the child makes, and times."""
+    """Except for times, and for the estimate of the error, which only the child makes."""
     wanted = Case(SCENES["four_bar"](), TIMES, "mbref", Setting("mpi-svd+projection", {"rtol": 1e-6}))
     here, child = untimed([run_here(wanted)]), untimed([run_case(wanted)])
     assert here[0].pop("error_estimate") is None and child[0].pop("error_estimate")["largest"] > 0
@@ -128,6 +130,7 @@ def test_run_in_a_child_gives_the_record_of_a_run_here():
 def test_cluster_of_two_workers_gives_the_records_of_a_serial_study(
     one_after_the_other: list[dict], tmp_path: Path
 ):
+    """Records are returned and stored; they are those of one thread here except for times and seconds."""
     from distributed import Client, LocalCluster
 
     path = tmp_path / "records.jsonl"
@@ -163,6 +166,7 @@ def untimed(records: list[dict]) -> list[dict]:
     ids=["family", "engine", "scene", "fewer times", "times", "options", "engine with threads"],
 )
 def test_key_depends_on_all_of_a_case_except_its_time_limit(other: Case, monkeypatch: pytest.MonkeyPatch):
+    """A case that differs from "a" in the part of its id has another key; records are found by their keys."""
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     assert key(other) != key(case("a"))

@@ -11,7 +11,7 @@ from crosscheck.conformance.mechanisms.closed_forms import free_fall
 from crosscheck.engine import Setting, engine
 from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory
-from mbref.scene import Body, Driver, Revolute, Scene, TorsionSpring
+from mbref.scene import Body, Revolute, Scene, TorsionSpring
 from mbref.scenes import SCENES
 from tests.crosscheck.measured import MARGIN, completed_error, error_of_samples
 
@@ -35,7 +35,8 @@ def simulate(scene: Scene, duration: float, rtol: float, samples: int = 6) -> Tr
 
 @pytest.mark.parametrize("name", REGULAR)
 def test_ida_stays_within_its_measured_error_of_the_truth(name: str) -> None:
-    """The tolerance of 1e-8 holds for a step: over a thousand steps errors grow by orders."""
+    """REGULAR has durations and measured errors; 10 times as much is allowed. The tolerance of 1e-8 holds for
+    a step: over a thousand steps errors grow by orders."""
     scene = SCENES[name]()
     duration, measured = REGULAR[name]
     assert completed_error(simulate(scene, duration, 1e-8), scene) < MARGIN * measured
@@ -48,6 +49,7 @@ def test_ida_lets_a_body_without_joints_fall_as_the_closed_form() -> None:
 
 
 def test_tolerance_of_a_hundredth_reduces_ida_s_error_fivefold() -> None:
+    """By the truth, twice in a row; a tolerance that had no effect would leave the error."""
     scene = SCENES["spatial_slider_crank"]()
     errors = [completed_error(simulate(scene, 0.01, rtol), scene) for rtol in (1e-4, 1e-6, 1e-8)]
     assert errors[1] < errors[0] / 5 and errors[2] < errors[1] / 5
@@ -98,10 +100,3 @@ def test_ida_turns_a_redundant_crank_by_more_than_a_turn() -> None:
     turned = run.angular_velocity[:, 0, 2].mean() * 0.25
     assert turned > 2 * math.pi, f"the crank has only turned by {turned:.3g} rad"
     assert completed_error(run, scene) < MARGIN * 1.5e-3
-
-
-def test_drivers_that_no_motion_can_follow_end_the_run() -> None:
-    base = SCENES["spatial_slider_crank"]()
-    scene = base.with_(driver=(Driver(joint="D", polynomial=(0.0, 0.0, 50.0)),), load=())
-    run = simulate(scene, 0.2, 1e-5)
-    assert run.outcome is not Outcome.COMPLETED and run.message, f"{run.outcome.label} {run.message!r}"

@@ -171,13 +171,6 @@ def test_engine_s_own_steps_follow_drivers_with_first_order(name: str) -> None:
     assert errors[0] / errors[1] > 1.8, f"{name}: errors {errors}"
 
 
-@pytest.mark.parametrize("name", [of("drake"), of("dart"), of("bullet")])
-def test_drake_dart_and_bullet_refuse_an_unknown_family(name: str) -> None:
-    scene = SCENES["four_bar"]()
-    with pytest.raises(ValueError, match="no family of settings 'best'"):
-        engine(name).run(scene, np.array([0.0]), Setting("best", {"step": 1e-3}))
-
-
 @pytest.mark.parametrize("name", [of("drake")])
 def test_discrete_steps_of_drake_do_not_serve_a_driven_scene(name: str) -> None:
     scene = SCENES["four_bar"]()

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crosscheck.judge.truth import closed_form, truth_for
-from crosscheck.judge.truth.locked import locked
 from mbref import rotations
 from mbref.scene import Body, Driver, Revolute, Scene, Spherical, Translational, Universal
 from mbref.scenes import SCENES
@@ -183,8 +182,3 @@ def test_door_on_tilted_hinges_stays_and_on_aligned_ones_swings():
     assert not rest.poses(times).velocity.any()
     assert closed_form(door(0.0)).name == "pendulum"
     assert closed_form(door(1e-8)) is None
-
-
-def test_no_built_in_scene_is_locked():
-    """Each has a freedom or a driver."""
-    assert all(locked(make()) is None for make in SCENES.values())
