@@ -82,16 +82,6 @@ PARTS = scene(
 POSE = constraints.initial_poses(PARTS)
 
 
-@pytest.mark.parametrize("count", [2, 0])
-def test_hinges_cylinders_and_slides_have_joint_coordinates_and_balls_have_none(count):
-    """Two samples at the start, where angle and displacement are zero by definition; or no samples."""
-    poses = np.stack([POSE[0]] * 2)[:count], np.stack([POSE[1]] * 2)[:count]
-    spins = np.zeros((count, 2, 3))
-    found = constraints.joint_coordinates(PARTS, np.array([0.0, 1.0])[:count], *poses, spins)
-    assert list(found) == ["A", "C", "T"]
-    assert all(np.array_equal(x, np.zeros((count, 2))) for x in found.values())
-
-
 def test_joint_rates_are_spin_about_and_velocity_along_the_axis():
     """Body b spins at 3 rad/s about z, hinge A's axis; c has 2 m/s along and 1 rad/s about C's axis x."""
     rates = constraints.joint_rates(PARTS, *POSE, np.array([O, (2.0, 5.0, 0.0)]), np.array([(0, 0, 3.0), X]))

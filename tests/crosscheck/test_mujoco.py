@@ -15,9 +15,8 @@ from crosscheck.engines.mujoco.adapter import ENGINE
 from crosscheck.engines.mujoco.context import LIBRARIES, library
 from crosscheck.engines.mujoco.families import ADAPTIVE, HARD
 from crosscheck.judge.metrics import error_series, order_of_convergence, violation_series
-from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory
-from mbref.scene import Body, Driver, Scene
+from mbref.scene import Body, Scene
 from mbref.scenes import SCENES
 from tests.crosscheck.measured import MARGIN, completed_error
 from tests.crosscheck.tree_scenes import every_joint
@@ -107,20 +106,6 @@ def test_error_of_tuned_mujoco_falls_with_the_fourth_power_of_the_step() -> None
     ]
     order = np.log2(errors[0] / errors[1])
     assert 3.5 < order < 5, f"errors {errors} of steps {steps}: order {order:.2f}, expected 4"
-
-
-def test_mujoco_follows_a_driver_with_polynomial_and_sine() -> None:
-    """The crank's angle is 3 t - 20 t² + 0.4 sin 30 t (rad); 6.9e-11 rad is the measured deviation."""
-    base = SCENES["spatial_slider_crank"]()
-    driver = Driver(joint="A", polynomial=(0.0, 3.0, -20.0), sine={"amplitude": 0.4, "frequency": 30.0})
-    scene = base.with_(driver=(driver,), load=(), duration=0.2)
-    run = simulate(scene, 0.2, "tuned", step=1e-4, beta=400.0, hard=HARD)
-    assert run.outcome is Outcome.COMPLETED, run.message
-    t = run.times
-    angle = 3 * t - 20 * t**2 + 0.4 * np.sin(30 * t)
-    turned = rotations.from_vector(angle[:, None] * np.array([0.0, 1.0, 0.0]))
-    off = rotations.angle_between(run.orientation[:, 0], turned).max()
-    assert off < MARGIN * 6.9e-11, f"the crank is {off:.2e} rad from where it is driven"
 
 
 def test_samples_are_at_the_times_asked_for() -> None:

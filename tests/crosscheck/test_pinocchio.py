@@ -10,12 +10,11 @@ from crosscheck.conformance.mechanisms.moving import moving_probes
 from crosscheck.engine import Setting, engine
 from crosscheck.engines.pinocchio.adapter import ENGINE
 from crosscheck.judge.metrics import violation_series
-from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Driver, Scene
 from mbref.scenes import SCENES
 from tests.crosscheck.measured import MARGIN, ROUNDING, completed_error
-from tests.crosscheck.tree_scenes import driven, every_joint
+from tests.crosscheck.tree_scenes import driven
 
 pinocchio = pytest.importorskip("pinocchio")
 
@@ -87,18 +86,6 @@ def test_projection_keeps_the_branch_of_the_driven_four_bar() -> None:
     assert plain.outcome is Outcome.NOT_FINITE and plain.t_end > 0.0378, plain.message
 
 
-def test_first_sample_of_pinocchio_has_the_scene_s_poses() -> None:
-    """Every joint type, by Pinocchio's kinematics at its initial coordinates."""
-    scene = every_joint()
-    run = engine("pinocchio").run(scene, np.array([0.0]), Setting("tuned", {"rtol": 1e-6, "min_step": 1e-4}))
-    wanted = np.array([body.position for body in scene.body]), np.array([b.orientation for b in scene.body])
-    off = (
-        abs(run.position[0] - wanted[0]).max(),
-        rotations.angle_between(run.orientation[0], wanted[1]).max(),
-    )
-    assert max(off) < ROUNDING, f"first poses {off} m, rad from the scene's"
-
-
 def test_pinocchio_follows_a_driver_exactly_at_a_loose_tolerance() -> None:
     """The sled's way is 0.5 t + 0.05 sin 7 t (m), to rounding at a tolerance of 1e-3: drivers prescribe
     coordinates of the tree and are not integrated."""
@@ -112,28 +99,6 @@ def test_pinocchio_follows_a_driver_exactly_at_a_loose_tolerance() -> None:
     expected = 0.5 * run.times + 0.05 * np.sin(7 * run.times)
     off = abs(moved - expected).max()
     assert off < ROUNDING, f"the sled is {off:.1e} m from where it is driven"
-
-
-def test_power_of_the_driving_moment_is_the_change_of_kinetic_energy() -> None:
-    """Crank at 124.8 rad/s: reaction moment about its axis × rate = central difference of the kinetic energy
-    with h = 1 µs, which is off by 2.4e-8 of it, measured."""
-    scene = SCENES["spatial_slider_crank_driven"]()
-    h, t = 1e-6, 0.013
-    run = engine("pinocchio").run(
-        scene, np.array([t - h, t, t + h]), Setting("tuned", {"rtol": 1e-11, "min_step": 1e-5})
-    )
-    energies = [kinetic(scene, run, k) for k in range(3)]
-    power = (energies[2] - energies[0]) / (2 * h)
-    moment = run.reactions["A"][1, 4]  # about +y, on the crank
-    assert abs(moment * 124.8 - power) < MARGIN * 2.4e-8 * abs(power)
-
-
-def kinetic(scene: Scene, run: Trajectory, k: int) -> float:
-    energy = 0.0
-    for b, body in enumerate(scene.body):
-        spin = rotations.rotate(rotations.conjugate(run.orientation[k, b]), run.angular_velocity[k, b])
-        energy += (body.mass * run.velocity[k, b] @ run.velocity[k, b] + spin**2 @ np.array(body.inertia)) / 2
-    return energy
 
 
 def test_driver_beyond_the_slider_s_reach_ends_the_run_with_its_samples() -> None:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import pytest
 
 from crosscheck.cli.commands import main
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.tolerances import FLOOR
-from crosscheck.recorded.columns import UNITS
 from crosscheck.recorded.exact import reference_table, write
 from crosscheck.recorded.judgement import judge_motion
 from crosscheck.recorded.reading import read
@@ -167,19 +164,6 @@ def test_tables_in_other_units_and_orders_are_judged_right(table, tmp_path):
     last = turned(table, lambda q: q[:, [1, 2, 3, 0]])
     write(last, tmp_path / "last.csv")
     assert judge_motion(SCENE, read(tmp_path / "last.csv", SCENE, {}, order="xyzw")).is_right
-
-
-def test_factor_of_every_unit_is_the_product_of_its_parts():
-    """A unit's part is a name with or without a prefix m, c, k or u: "N mm" has two parts. Units of time in
-    the denominator are seconds, whose factor is 1."""
-    names = {"m": 1, "s": 1, "N": 1, "W": 1, "J": 1, "rad": 1, "1": 1, "in": 0.0254, "ft": 0.3048, "min": 60}
-    names |= {"deg": np.pi / 180, "rev": 2 * np.pi, "rpm": 2 * np.pi / 60}
-    names |= {
-        p + n: f * names[n] for p, f in (("m", 1e-3), ("c", 1e-2), ("k", 1e3), ("u", 1e-6)) for n in "msNWJ"
-    }
-    for unit, factor in UNITS.items():
-        above = re.sub("^N(?=m)", "N ", unit.partition("/")[0]).replace("*", " ")
-        assert factor == pytest.approx(np.prod([names[part] for part in above.split()])), unit
 
 
 @pytest.mark.parametrize(

@@ -35,18 +35,6 @@ def hinge(more: str = "", kind: str = "revolute", ends: str = "", name: str = "j
 
 
 # --- Links ------------------------------------------------------------------------------------------------
-def test_link_becomes_a_body_with_its_inertial_pose_and_moments(tmp_path: Path) -> None:
-    """The link, at (1, 2, 3), and its inertial frame, 0.5 m along the link's x axis, are each turned by a
-    quarter turn about z: the centre is at (1, 2.5, 3), and the moments about x and y are exchanged."""
-    moved = MASS.replace("<inertial>", f"<inertial><pose>0.5 0 0 0 0 {math.pi / 2!r}</pose>")
-    link = f'<link name="b"><pose>1 2 3 0 0 {math.pi / 2!r}</pose>{moved}</link>'
-    [body] = read(tmp_path, link).scene.body
-    half = math.sqrt(0.5)
-    assert (body.name, body.mass) == ("b", 2.0) and body.position == pytest.approx((1.0, 2.5, 3.0))
-    assert body.orientation == pytest.approx((half, 0.0, 0.0, half))
-    assert body.inertia == pytest.approx((2.0, 1.0, 2.5))
-
-
 def test_links_without_inertial_and_worlds_without_gravity_get_sdf_s_defaults(tmp_path: Path) -> None:
     """1 kg and 1 kg m² about each axis; 9.8 m/s² downwards. Notes say so, for a link without ``inertial``."""
     bare = '<link name="b"/><link name="c"><inertial/></link>'
@@ -83,16 +71,6 @@ def test_link_element_that_changes_the_motion_is_refused_or_left_out(
 
 
 # --- Joints -----------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("kind", ["revolute", "prismatic", "ball", "fixed", "universal", "continuous"])
-def test_joint_lies_at_its_child_with_its_axes(kind: str, tmp_path: Path) -> None:
-    """The child link is at (1, 2, 3) and not turned; axis is z, and axis2 of a universal joint x."""
-    found = read(tmp_path, LINK + hinge(kind=kind, axes="axis axis2" if kind == "universal" else "axis"))
-    [joint] = found.scene.joint
-    assert joint.bodies == ("ground", "b") and joint.anchor_pair[0] == (1.0, 2.0, 3.0)
-    wanted = {"universal": [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0)], "ball": [], "fixed": []}
-    assert [tuple(axis) for axis in joint.directions] == wanted.get(kind, [(0.0, 0.0, 1.0)])
-
-
 def test_axis_is_normalised_in_the_frame_that_it_names(tmp_path: Path) -> None:
     """The link is turned by a quarter turn about x, so that its z axis is the world's -y. The axis is (0, 0,
     4) of the link or of the model; without numbers it is z of the link, SDF's default."""

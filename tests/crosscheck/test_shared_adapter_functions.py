@@ -10,7 +10,6 @@ import pytest
 
 from crosscheck.engines.shared.compiler import Compiler, NoLibrary
 from crosscheck.engines.shared.fixed_steps import unended_piece
-from crosscheck.engines.shared.geometry import in_body, point_in_body
 from crosscheck.engines.shared.sampling import Counts, Failed, Sample, run_through
 from crosscheck.refusals import Owner
 from mbref.motions.trajectory import Outcome
@@ -32,15 +31,6 @@ def scene(*bodies: Body, **parts: Any) -> Scene:
 
 
 # --- frames -----------------------------------------------------------------------------------------------
-
-
-def test_world_vectors_and_points_are_given_in_a_body_s_axes():
-    """The body is turned by 90° about z: X of the world is -y of the body, Y is x."""
-    turned = scene(body(orientation=(HALF, 0.0, 0.0, HALF)))
-    assert in_body(turned, "b", np.array([X, Y])) == pytest.approx(np.array([[0, -1, 0], [1, 0, 0.0]]))
-    assert point_in_body(turned, "b", (2.0, 2.0, 4.0)) == pytest.approx([0.0, -1.0, 1.0])
-    assert in_body(turned, "ground", np.array([X])).tolist() == [list(X)]
-    assert point_in_body(turned, "ground", (2.0, 2.0, 4.0)).tolist() == [2.0, 2.0, 4.0]
 
 
 # --- steps ------------------------------------------------------------------------------------------------

@@ -66,13 +66,6 @@ def test_steady_poses_are_balanced_with_symmetric_positive_mass_matrix(judged):
         assert np.allclose(mass, mass.T, rtol=1e-14) and np.linalg.eigvalsh(mass)[0] > 0
 
 
-def test_damped_slides_have_symmetric_stiffness_and_positive_damping():
-    """Springs and dampers between slides, without spin or gyroscopic terms, give such matrices K and D."""
-    [each] = steady_poses(damped_slides(), starts=1)
-    assert np.allclose(each.small.stiffness, each.small.stiffness.T, rtol=1e-13)
-    assert np.linalg.eigvalsh(each.small.damping)[0] > 0
-
-
 def test_four_bar_with_diagonal_spring_has_its_closed_form_eigenvalues():
     """I s² + c d'² s + V'' = 0, solved in thirty digits by python-flint. Newton's method gives V' = 0; the
     angle is the one that the IFToMM benchmark prints, up to its 4e-11 rad."""

@@ -22,31 +22,6 @@ def grids(monkeypatch: pytest.MonkeyPatch):
     return grids
 
 
-def test_speed_comparison_assigns_families_to_their_integrators(monkeypatch: pytest.MonkeyPatch):
-    """An engine's own, crosscheck's around compiled code, or crosscheck's in Python; mbref's families are the
-    Taylor series and other methods."""
-    monkeypatch.syspath_prepend(str(BENCHMARKS))
-    from speed import COMPILED_HERE, OPPONENTS, OURSELVES, OWN, _integrator
-
-    assert _integrator("mujoco", "tuned") == _integrator("mbref", "taylor") == OWN
-    assert (
-        _integrator("pinocchio", "tuned, compiled")
-        == _integrator("mujoco", "newton, compiled")
-        == COMPILED_HERE
-    )
-    assert _integrator("pinocchio", "tuned") not in (OWN, COMPILED_HERE)
-    assert OPPONENTS["own integrators"][1] == (OWN,) and OPPONENTS["engines"][1] == ()
-    ours = {
-        family: [w for w, belongs in OURSELVES.items() if belongs(family)]
-        for family in ("taylor", "taylor, generated", "lm2+projection")
-    }
-    assert ours == {
-        "taylor": ["series"],
-        "taylor, generated": ["series"],
-        "lm2+projection": ["other methods"],
-    }
-
-
 def test_speed_grid_recognises_scenes_with_singular_positions(grids):
     """Crank and rod of the heavy slider-crank are equal, so that it crosses them; of the other they are
     not."""

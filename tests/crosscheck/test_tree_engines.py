@@ -146,16 +146,14 @@ def test_engines_move_and_react_by_gauss_s_principle(name: str, setting: str) ->
     assert max(off.values()) < MARGIN * MEASURED[setting], (name, setting, off)
 
 
-@pytest.mark.parametrize(
-    "name", ["every joint", "spherical", "ring universal", "free and spinning", "distance"]
-)
-def test_accelerations_of_pinocchio_are_slopes_of_its_velocities(name: str) -> None:
-    """Central differences with h = 1e-4 s, to 2e-5 of the largest."""
-    scene, h = ALL[name], 1e-4
-    times = np.array([0.1 - h, 0.1, 0.1 + h])
-    run = engine("pinocchio").run(scene, times, FINE["pinocchio"])
-    for rate, slope in (("velocity", "acceleration"), ("angular_velocity", "angular_acceleration")):
-        values = getattr(run, rate)
-        gap = abs((values[2] - values[0]) / (2 * h) - getattr(run, slope)[1]).max()
-        scale = 1 + abs(getattr(run, slope)).max()
-        assert gap < 2e-5 * scale, f"{name}: {slope} off by {gap:.2e} of {scale:.3g} from the slope of {rate}"
+@pytest.mark.parametrize("name", ["every joint", "spherical", "ring universal", "distance"])
+@pytest.mark.parametrize("rate", ["velocity", "angular_velocity"])
+def test_accelerations_of_pinocchio_are_slopes_of_its_velocities(name: str, rate: str) -> None:
+    """At 0.1 s, by central differences with h = 1e-4 s of the velocities, whose error is of the order h²; the
+    largest measured is 4.5e-7 of the largest acceleration."""
+    h = 1e-4
+    run = engine("pinocchio").run(ALL[name], np.array([0.1 - h, 0.1, 0.1 + h]), FINE["pinocchio"])
+    before, _, after = getattr(run, rate)
+    accelerations = getattr(run, rate.replace("velocity", "acceleration"))
+    off = abs((after - before) / (2 * h) - accelerations[1]).max() / abs(accelerations).max()
+    assert off < MARGIN * 4.5e-7, f"{name}: off by {off:.2e} from the slope of {rate}"

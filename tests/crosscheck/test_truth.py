@@ -1,4 +1,4 @@
-"""Truths against second computations: textbook formulas, quadrature, differences of poses, a DAE."""
+"""The judge's truths / textbook formulas, quadrature, published numbers and conserved quantities."""
 
 import itertools
 import math
@@ -18,21 +18,26 @@ from mbref.scene import Body, Driver, Revolute, Scene, Spring, TorsionSpring
 from mbref.scenes import SCENES
 from tests.crosscheck.truth_scenes import ALL, Z, block, free, pendulum
 
+ROUNDED = 1e-14  # m or rad: some roundings of numbers up to 1
+
 
 @pytest.mark.parametrize("name", ALL)
 def test_truth_satisfies_the_joints_at_three_levels(name):
-    """Violations over the length; rates relative to the spin, accelerations to its square."""
+    """Violations of positions, rates and accelerations are rounding, of the length; rates relative to the
+    largest spin (rad/s, at least 1), accelerations to its square."""
     scene = ALL[name]
     motion = truth_for(scene).poses(np.linspace(0.0, scene.duration, 41))
     spin = max(1.0, np.abs(motion.angular_velocity).max())
     found = measure(scene, motion)
     for level, scale in (("position", 1.0), ("velocity", spin), ("acceleration", spin**2)):
         got = found[f"violation_{level}"]
-        assert got < 1e-12 * scale, f"{name}: {level} violation {got}, allowed {1e-12 * scale}"
+        assert got < 100 * ROUNDED * scale, f"{name}: {level} violation {got}"
 
 
 @pytest.mark.parametrize("name", ALL)
 def test_truth_starts_with_the_scene_s_poses_and_velocities(name):
+    """Velocities are those that joints and drivers determine. They do not for a free body and the straight
+    four-bar, which are judged by poses alone."""
     scene = ALL[name]
     motion = truth_for(scene).poses(np.zeros(1))
     position, orientation = constraints.initial_poses(scene)
@@ -40,37 +45,40 @@ def test_truth_starts_with_the_scene_s_poses_and_velocities(name):
         np.abs(motion.position[0] - position).max(),
         rotations.angle_between(motion.orientation[0], orientation).max(),
     )
-    assert max(off) < 1e-14, f"{name}: starts {off} away"
-    if name != "four_bar_straight" and scene.joint:  # there the joints alone do not determine the velocities
+    assert max(off) < ROUNDED, f"{name}: starts {off} away"
+    if name != "four_bar_straight" and scene.joint:
         velocity, spin = constraints.initial_twists(scene)
         got = np.abs(motion.velocity[0] - velocity).max(), np.abs(motion.angular_velocity[0] - spin).max()
-        assert max(got) < 1e-14 * max(1, np.abs(spin).max()) * 4, f"{name}: initial velocities {got} away"
+        assert max(got) < 4 * ROUNDED * max(1, np.abs(spin).max()), f"{name}: initial velocities {got} away"
 
 
-@pytest.mark.parametrize("theta0", [0.4, math.pi / 2, math.pi])
-def test_parallelogram_is_the_circle_of_its_crank(theta0):
-    """The coupler's centre moves on a circle of 0.5 m about (0.25, 0) m and does not turn: links of 0.5 m,
-    driven at -124.8 rad/s, or at 3 rad/s from the built-in pose with gravity."""
-    name = {0.4: None, math.pi / 2: "four_bar", math.pi: "four_bar_straight"}[theta0]
-    scene = (
-        SCENES[name]()
-        if name
-        else SCENES["four_bar_gravity"]().with_(
-            driver=(Driver(joint="D", polynomial=(0.0, 3.0)),), gravity=(0, 0, 0)
-        )
-    )
-    start, rate = (theta0, -124.8) if name else (0.3, 3.0)
+ROCKER_DRIVEN = SCENES["four_bar_gravity"]().with_(driver=(Driver(joint="D", polynomial=(0.0, 3.0)),))
+
+
+@pytest.mark.parametrize(
+    ("scene", "start", "rate"),  # rad, rad/s
+    [
+        (SCENES["four_bar"](), math.pi / 2, -124.8),
+        (SCENES["four_bar_straight"](), math.pi, -124.8),
+        (ROCKER_DRIVEN, 0.3, 3.0),
+    ],
+    ids=["crank driven from upright", "crank driven from the straight position", "rocker driven"],
+)
+def test_coupler_of_a_driven_rhombus_moves_on_a_circle_without_turning(scene, start, rate):
+    """All bars are 0.5 m, the ground along x: the coupler stays parallel to it, and its centre is at (0.25 +
+    0.5 cos φ, 0.5 sin φ) m with the crank's angle φ = start + rate · t."""
     t = np.linspace(0, scene.duration, 30)
     angle = start + rate * t
     coupler = np.stack([0.25 + 0.5 * np.cos(angle), 0.5 * np.sin(angle), 0 * t], axis=1)
     motion = truth_for(scene).poses(t)
-    assert np.abs(motion.position[:, 1] - coupler).max() < 1e-14
+    assert np.abs(motion.position[:, 1] - coupler).max() < ROUNDED
     turned = rotations.angle_between(motion.orientation[:, 1], np.array([1.0, 0, 0, 0])).max()
-    assert turned < 1e-15, f"the coupler turned by {turned}"
+    assert turned < ROUNDED, f"the coupler turned by {turned}"
 
 
 def test_four_bar_chain_has_the_published_position_and_velocity():
-    """At the top of the first upright at 10 s, by a finite-element code with steps of 1.25e-4 s (7.3e-7)."""
+    """Of the top of the first upright (m, m/s) at 10 s, by a finite-element code of second order. Its step of
+    1.25e-4 s leaves errors of some 1e-6, below the limit of 4e-6."""
     published = {"position": (0.3284573768, 0.9445187937), "velocity": (1.423050003, -0.4948670827)}
     found = truth_for(SCENES["four_bar_chain"]()).poses(np.array([10.0]))
     for name, value in published.items():
@@ -85,12 +93,14 @@ def test_driven_spatial_slider_follows_the_paper_s_formula():
     angle = 124.8 * t
     wanted = np.sqrt(0.4**2 - (0.1 * np.cos(angle) - 0.15) ** 2 - (0.1 * np.sin(angle)) ** 2)
     off = np.abs(truth_for(scene).poses(t).position[:, 2, 1] - wanted).max()
-    assert off < 1e-14, f"slider off by {off}"
+    assert off < ROUNDED, f"slider off by {off}"
 
 
 @pytest.mark.parametrize("name", ["planar_slider_crank_equal", "planar_slider_crank_heavy"])
 def test_equal_slider_crank_turns_by_the_energy_quadrature(name):
-    """From rest under a constant moment, θ'² = 2 τ θ / I(θ), so t = ∫ sqrt(I / 2 τ θ) dθ; θ = u²."""
+    """From rest under a constant moment τ = 100 N m, θ'² = 2 τ θ / I(θ), so t = ∫ √(I / 2 τ θ) dθ, with θ =
+    u², and the slider is at 2 a cos θ. All to rounding, over more than three singular positions (at π/2 +
+    kπ)."""
     scene = SCENES[name]()
     a, crank, rod = 0.308, scene.body[0], scene.body[1]
 
@@ -108,12 +118,12 @@ def test_equal_slider_crank_turns_by_the_energy_quadrature(name):
         quad(lambda u: math.sqrt(2 * inertia(u * u) / 100.0), lo, hi, epsabs=0, epsrel=1e-13)[0]
         for lo, hi in itertools.pairwise(edges)
     ]
-    assert abs(math.fsum(pieces) - end) < 1e-13 * end * 5
+    assert abs(math.fsum(pieces) - end) < 50 * ROUNDED * end
     speed = math.sqrt(200.0 * theta / inertia(theta))
-    assert abs(rate - speed) < 1e-13 * speed, f"rate {rate}, energy gives {speed}"
+    assert abs(rate - speed) < 10 * ROUNDED * speed, f"rate {rate}, energy gives {speed}"
     slider = motion.poses(np.array([end])).position[0, 2, 0]
-    assert abs(slider - 2 * a * math.cos(theta)) < 1e-13, f"slider at {slider}"
-    assert theta > 3.5 * math.pi, "the motion crosses singular positions"
+    assert abs(slider - 2 * a * math.cos(theta)) < 10 * ROUNDED, f"slider at {slider}"
+    assert theta > 3.5 * math.pi
 
 
 def test_pendulum_swings_by_the_elliptic_function():
@@ -126,7 +136,7 @@ def test_pendulum_swings_by_the_elliptic_function():
     angle = 2 * np.arcsin(math.sqrt(m) * ellipj(w * t + ellipk(m), m)[0])
     wanted = np.stack([length * np.sin(angle), -length * np.cos(angle)], axis=1)
     off = np.abs(truth_for(scene).poses(t).position[:, 0, :2] - wanted).max()
-    assert off < 1e-13, f"pendulum off by {off}"
+    assert off < 10 * ROUNDED, f"pendulum off by {off}"
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -142,7 +152,7 @@ def test_torsion_pendulum_is_the_damped_oscillator(sign):
     decay, w = 0.3 / (2 * inertia), math.sqrt(5.0 / inertia - (0.3 / (2 * inertia)) ** 2)
     angle = sign * (7.0 - 7.0 * np.exp(-decay * t) * (np.cos(w * t) + decay / w * np.sin(w * t)))
     got = truth_for(scene).coordinate(t)[:, 0]
-    assert np.abs(got - angle).max() < 1e-13, f"angle off by {np.abs(got - angle).max()}"
+    assert np.abs(got - angle).max() < 10 * ROUNDED, f"angle off by {np.abs(got - angle).max()}"
 
 
 def test_block_on_a_damped_spring_is_the_damped_oscillator():
@@ -161,12 +171,13 @@ def test_block_on_a_damped_spring_is_the_damped_oscillator():
     w = math.sqrt(50.0 / 2.0 - 1.0)
     wanted = rest - rest * np.exp(-t) * (np.cos(w * t) + np.sin(w * t) / w)
     got = truth_for(scene).coordinate(t)[:, 0]
-    assert np.abs(got - wanted).max() < 1e-13, f"displacement off by {np.abs(got - wanted).max()}"
+    assert np.abs(got - wanted).max() < 10 * ROUNDED, f"displacement off by {np.abs(got - wanted).max()}"
 
 
 def test_truth_ends_where_a_spring_has_no_length():
-    """A bar turned by half a turn brings a spring to length zero, where its force jumps. The truth states the
-    time, at which the angle is π and the energy the one at the start."""
+    """A bar turned by half a turn brings a spring to length zero, where its force jumps. At the time that the
+    error states the angle is π, to 1e-6 rad, and the energy that of the start: spring and spin of 0.0533 kg
+    m² about the pivot."""
     bar = Body(
         name="bar",
         mass=1.0,
@@ -201,11 +212,12 @@ def test_symmetric_top_precesses_about_its_angular_momentum():
     relative = rotations.from_vector((4.0 - 0.3 * 4.0 / 0.2) * t[:, None] * np.array(Z))
     wanted = rotations.multiply(precession, relative)
     off = rotations.angle_between(motion.orientation[:, 0], wanted).max()
-    assert off < 1e-13, f"top off by {off} rad"
+    assert off < 10 * ROUNDED, f"top off by {off} rad"
 
 
 def test_free_body_falls_and_keeps_energy_and_angular_momentum():
-    """The centre falls as r + v t + g t² / 2."""
+    """The centre falls as r + v t + g t² / 2; angular momentum and energy are those of the start, to
+    rounding."""
     scene = free(gravity=(0.0, 0.0, -9.81), duration=5.0)
     t = np.linspace(0, 5.0, 40)
     motion = truth_for(scene).poses(t)
@@ -214,10 +226,8 @@ def test_free_body_falls_and_keeps_energy_and_angular_momentum():
         + t[:, None] * np.array([0, 2.0, 1.0])
         + t[:, None] ** 2 / 2 * np.array([0, 0, -9.81])
     )
-    assert np.abs(motion.position[:, 0] - fall).max() < 1e-13, np.abs(motion.position[:, 0] - fall).max()
+    assert np.abs(motion.position[:, 0] - fall).max() < 10 * ROUNDED
     inertia = world_inertia(scene, rotations.to_matrix(motion.orientation))[:, 0]
     momentum = np.einsum("kij,kj->ki", inertia, motion.angular_velocity[:, 0])
-    off = np.abs(momentum - momentum[0]).max()
-    assert off < 1e-14, f"angular momentum drifts by {off}"
-    drift = energy_series(scene, motion).max()
-    assert drift < 1e-14, f"energy drifts by {drift}"
+    assert np.abs(momentum - momentum[0]).max() < ROUNDED
+    assert energy_series(scene, motion).max() < ROUNDED

@@ -1,4 +1,4 @@
-"""Which scenes a truth recognises, and that it moves with them."""
+"""Closed forms of scenes / formulas, other descriptions of a scene, and scenes that have none."""
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from mbref.scenes import SCENES
 from mbref.scenes.planar_slider_crank import planar_slider_crank, slider_crank
 from tests.crosscheck.truth_scenes import ALL, CLOSED, Z, free, pendulum
 
+ROUNDED = 1e-13  # m or rad; roundings of 1, and their growth along the motion
 FAMILY = {name: name for name in ("planar_slider_crank", "spatial_slider_crank")} | {
     "four_bar": "parallelogram",
     "five_bar": "parallelogram",
@@ -22,6 +23,7 @@ FAMILY = {name: name for name in ("planar_slider_crank", "spatial_slider_crank")
 
 @pytest.mark.parametrize("name", CLOSED)
 def test_built_in_scene_has_the_closed_form_of_its_family(name):
+    """FAMILY has the name of the closed form by the beginning of the scene's name."""
     truth = truth_for(SCENES[name]())
     family = next(FAMILY[prefix] for prefix in FAMILY if name.startswith(prefix))
     assert truth is not None and truth.name == family, f"{name}: {truth and truth.name}, expected {family}"
@@ -29,12 +31,13 @@ def test_built_in_scene_has_the_closed_form_of_its_family(name):
 
 @given(a=st.floats(0.1, 1.0), ratio=st.floats(1.05, 4.0))
 def test_slider_crank_of_any_lengths_has_its_closed_form(a, ratio):
-    """x = a cos θ + √(b² - a² sin² θ), with cos θ and sin θ of the crank's own position."""
+    """The slider is at x = a cos θ + √(b² - a² sin² θ), to rounding, with a cos θ and a sin θ of the crank's
+    own position."""
     scene = planar_slider_crank(a, a * ratio)
     motion = truth_for(scene).poses(np.linspace(0, 0.05, 9))
     crank = 2 * motion.position[:, 0]
     x = crank[:, 0] + np.sqrt((a * ratio) ** 2 - crank[:, 1] ** 2)
-    assert np.abs(motion.position[:, 2, 0] - x).max() < 1e-13 * a * ratio * 10
+    assert np.abs(motion.position[:, 2, 0] - x).max() < 10 * ROUNDED * a * ratio
 
 
 def with_joints(scene, change, **changes):
@@ -54,11 +57,13 @@ def apart(scene, other):
     "name", ["planar_slider_crank_gravity", "spatial_slider_crank_gravity", "four_bar_gravity"]
 )
 def test_truth_does_not_depend_on_the_sign_of_an_axis(name):
+    """All axes of the undriven scene's joints are reversed."""
+
     def flipped(joint):
         axis = getattr(joint, "axis", None)
         return joint if axis is None else joint.model_copy(update={"axis": tuple(-x for x in axis)})
 
-    assert apart(ALL[name], with_joints(ALL[name], flipped)) < 1e-13
+    assert apart(ALL[name], with_joints(ALL[name], flipped)) < ROUNDED
 
 
 @pytest.mark.parametrize(
@@ -75,7 +80,7 @@ def test_joint_seen_from_its_other_body_is_driven_backwards(name):
     (driver,) = scene.driver
     sine = driver.sine and driver.sine.model_copy(update={"amplitude": -driver.sine.amplitude})
     backwards = Driver(joint=driver.joint, polynomial=tuple(-c for c in driver.polynomial), sine=sine)
-    assert apart(scene, with_joints(scene, swapped, driver=(backwards,))) < 1e-13
+    assert apart(scene, with_joints(scene, swapped, driver=(backwards,))) < ROUNDED
 
 
 @pytest.mark.parametrize("joint", ["A", "D", "E", "F"])
@@ -83,7 +88,7 @@ def test_five_bar_driven_at_any_joint_moves_alike(joint):
     """Crank and rocker turn against the ground, the bar turns the other way against the crank."""
     scene = ALL["five_bar"]
     rate = 124.8 if joint == "E" else -124.8
-    assert apart(scene, scene.with_(driver=(Driver(joint=joint, polynomial=(0.0, rate)),))) < 1e-13
+    assert apart(scene, scene.with_(driver=(Driver(joint=joint, polynomial=(0.0, rate)),))) < ROUNDED
 
 
 def test_rod_of_a_folded_slider_crank_turns_about_the_resting_slider():
@@ -108,7 +113,7 @@ def test_rod_of_a_folded_slider_crank_turns_about_the_resting_slider():
     motion = truth_for(folded).poses(t)
     circle = 0.15 * np.stack([np.cos(theta0 + 5 * t), np.sin(theta0 + 5 * t), 0 * t], axis=1)
     off = np.abs(motion.position[:, 1] - circle).max(), np.abs(motion.position[:, 2]).max()
-    assert max(off) < 1e-14, f"rod and slider off by {off}"
+    assert max(off) < ROUNDED, f"rod and slider off by {off}"
 
 
 def moved_anchor(scene, joint, anchor):
@@ -146,6 +151,7 @@ STRANGERS = {
 
 @pytest.mark.parametrize("why", STRANGERS)
 def test_scene_of_no_family_has_no_closed_form(why):
+    """STRANGERS has scenes that differ from a family by the property in their name."""
     truth = closed_form(STRANGERS[why])
     assert truth is None, f"{why}: taken for {truth.name}"
 

@@ -82,6 +82,7 @@ def group(records=RECORDS, scene=REDUNDANT, **known: Any) -> Judged:
     ],
 )
 def test_grade_follows_from_the_error_of_a_completed_run(error, verdict):
+    """Right up to 1e-8 of the length, wrong above 1e-2; a run that did not complete has failed."""
     assert grade(record("a", "b", error)) is verdict
     assert grade(record("a", "b", error, outcome="TIMED_OUT")) is Grade.FAILED
 
@@ -137,13 +138,14 @@ SITUATIONS = {
 
 @pytest.mark.parametrize("situation", SITUATIONS)
 def test_verdict_in_sentences(situation, snapshot):
-    """The stored sentences state the situation: errors and times are those of its records."""
+    """The snapshot has the sentences for the records of SITUATIONS, which state errors and times of these."""
     groups = SITUATIONS[situation]
     said = {"headline": headline(groups), "right": right(groups), "fast": fast(groups)}
     assert {**said, "breaks": breaks(groups), "truth": truth(groups)} == snapshot
 
 
 def test_defaults_without_a_truth_are_not_judged(snapshot):
+    """Two engines' defaults complete a motion whose truth is unknown; the snapshot has the sentences."""
     unjudged = [record(name, "defaults", None, times=[0.0]) for name in ("mujoco", "exudyn")]
     assert breaks([group(unjudged, **UNKNOWN)]) == snapshot
 

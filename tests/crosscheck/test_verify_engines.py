@@ -37,6 +37,8 @@ def known(name: str, scenes: tuple[str, ...]) -> set[tuple[str, str, str]]:
 
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_built_in_engine_violates_no_check_on_six_probes(name):
+    """Checks of the suite, such as truth, energy and reactions; KNOWN has those that fail, with the
+    reason."""
     found = violations(name, QUICK, related=False)
     assert set(found) == known(name, QUICK), found
 
@@ -44,6 +46,7 @@ def test_built_in_engine_violates_no_check_on_six_probes(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_built_in_engine_violates_no_check_on_couplings(name):
+    """Scenes with gears, racks and screws, whose motions are known in closed form."""
     found = violations(name, tuple(make()[0].name for make in GEARED), related=False)
     assert not found, found
 

@@ -1,4 +1,4 @@
-"""Words for numbers and lists, and which runs are timed again / worked out by hand, at the ends of ranges."""
+"""Words for numbers and lists / worked out by hand, at the ends of ranges."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ def test_list_is_joined_by_commas_and_the_word_and():
     ],
 )
 def test_error_is_rounded_up_or_called_less_than_the_bound(value, bound, said):
+    """``value`` is a run's error, ``bound`` that of the truth: two digits, rounded up, hold for "at most"."""
     assert text.at_most(value, bound) == said
 
 
