@@ -106,6 +106,8 @@ def names(place: Path) -> list[str]:
 
 @pytest.mark.slow
 def test_a_wheel_has_two_packages_and_every_file_of_data(built):
+    """Every file in mbref and crosscheck of the checkout, and modules and templates of reports as
+    crosscheck/reports."""
     files = names(built)
     assert {name.partition("/")[0] for name in files if ".dist-info" not in name} == {"mbref", "crosscheck"}
     needed = {name for folder in ("mbref", "crosscheck") for name in of_folder(folder)}
@@ -133,7 +135,7 @@ def test_a_source_archive_has_documents_and_no_tests(built):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("program", "parser"), [("mbref", mbref_parser), ("crosscheck", crosscheck_parser)])
-def test_list_of_commands_to_run_has_each_command_of_a_program(program, parser):
+def test_commands_that_the_wheel_is_tried_with_are_all_commands_of_the_programs_help(program, parser):
     known = re.findall(r"^    ([a-z][a-z-]+)(?: |$)", parser().format_help(), flags=re.M)
     assert {words[0] for words in COMMANDS[program]} == set(known)
 
@@ -170,7 +172,8 @@ def installed(built, tmp_path_factory) -> Installed:
 
 
 @pytest.mark.slow
-def test_each_command_of_a_wheel_ends_with_status_0(installed):
+def test_each_command_of_an_installed_wheel_ends_with_status_0_and_renders_a_report(installed):
+    """COMMANDS ran in an environment that has the wheel, not the checkout."""
     assert len(installed.ends) == sum(map(len, COMMANDS.values()))
     for program, words, status, said in installed.ends:
         assert status == 0 and "Traceback" not in said, (program, words, status, said)

@@ -8,8 +8,9 @@ from crosscheck.cli import main
 from tests.helpers.fake_engines import FAKES
 
 
-def test_modes_survives_engines_that_crash_or_print(capfd):
-    """SEGFAULT ends its process by a signal. CHATTER prints a banner past Python."""
+def test_modes_reports_the_crash_of_one_engine_and_hides_the_banner_of_another(capfd):
+    """SEGFAULT ends its process by SIGSEGV. CHATTER writes a banner to standard output past Python; it has no
+    accelerations."""
     engines = [word for name in ("SEGFAULT", "CHATTER") for word in ("--engine", f"{FAKES}:{name}")]
     assert main(["modes", "point_pendulum", "--starts", "1", "--json", *engines]) == 0
     out, said = capfd.readouterr()

@@ -28,7 +28,8 @@ def said(options: Mapping[str, Any], remedy: Mapping[str, Any], **conditions: An
     return [one.sentence for one in shown]
 
 
-def test_defect_is_said_where_the_remedy_mends_the_accelerations():
+def test_defect_is_reported_where_its_remedy_mends_the_accelerations():
+    """The stone falls with 1.5 g, off by (1.5 - 1) g of g; with the remedy it falls with g."""
     (sentence,) = said({"factor": 1.5}, {"factor": 1.0}, versions=["1.0"])
     assert "1.0 falls too fast and is wrong there: set factor = 1" in sentence
     assert "off by 0.5 of the largest, otherwise by 0" in sentence
@@ -37,16 +38,18 @@ def test_defect_is_said_where_the_remedy_mends_the_accelerations():
 @pytest.mark.parametrize(
     ("options", "remedy", "conditions"),
     [
-        ({"factor": 1.0}, {"factor": 1.0}, {}),  # the remedy changes nothing
-        ({"factor": 1.0}, {"factor": 1.5}, {}),  # the truth is not with it
+        ({"factor": 1.0}, {"factor": 1.0}, {}),
+        ({"factor": 1.0}, {"factor": 1.5}, {}),
         ({"factor": 1.5}, {"factor": 1.0}, {"versions": ["1.1"]}),
         ({"factor": 1.5}, {"factor": 1.0}, {"loops": 1}),
         ({"factor": 1.5}, {"factor": 1.0}, {"joints": ["revolute"]}),
     ],
+    ids=["remedy changes nothing", "remedy makes it wrong", "other version", "no loop", "no hinge"],
 )
-def test_nothing_is_said_without_a_clear_improvement_or_where_conditions_fail(
+def test_no_defect_is_reported_without_an_improvement_or_where_its_conditions_are_not_met(
     options: dict[str, Any], remedy: dict[str, Any], conditions: dict[str, Any]
 ):
+    """Factors are of gravity. The engine has the version 1.0, and the stone neither loops nor joints."""
     assert said(options, remedy, **conditions) == []
 
 
@@ -54,6 +57,7 @@ def test_nothing_is_said_without_a_clear_improvement_or_where_conditions_fail(
 def test_sparse_jacobian_of_mujoco_4_0_0_is_named_at_a_file_with_several_loops(
     capsys: pytest.CaptureFixture[str],
 ):
+    """MuJoCo 4.0.0 factorises the sparse matrix of this file wrongly; other versions have no defect there."""
     status = main(["diagnose", str(CHAINS), "--engine", "mujoco", "--json"])
     (found,) = json.loads(capsys.readouterr().out)["engines"]
     is_wrong = engine("mujoco").version() == "4.0.0"

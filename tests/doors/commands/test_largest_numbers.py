@@ -46,6 +46,7 @@ def ended(capsys: pytest.CaptureFixture[str], *command: str) -> tuple[object, st
 @pytest.mark.parametrize("text", HUGE, ids=lambda text: f"{text[:6]} ({len(text)})")
 @pytest.mark.parametrize("command", COUNTS, ids=" ".join)
 def test_count_outside_its_range_is_refused_with_the_range(command: tuple[str, ...], text: str, capsys):
+    """COUNTS has the range of each option. The line stays short, also for a number of 5000 digits."""
     status, said = ended(capsys, *command, text)
     assert status == 2
     assert f"{command[-1]}: must be a whole number {COUNTS[command]}, got {text[:40]}" in said
@@ -110,7 +111,8 @@ def test_error_as_large_as_the_mechanism_is_refused(command, text: str, capsys):
     assert status == 2 and f"must be {ends}, got {text}" in said
 
 
-def test_closure_gap_longer_than_the_mechanism_is_refused(capsys):
+def test_closure_gap_longer_than_the_mechanism_is_refused_with_its_length(capsys):
+    """The largest distance in the start pose of the four-bar, a rhombus of 0.5 m sides, is 0.5 √2 m."""
     status, said = ended(capsys, "tune", "tests.helpers.still_engines:LOGGED", "four_bar", "--closure", "1km")
     assert status == 2
     assert "--closure: must be at most the mechanism's length, 0.707 m, got 1000 m" in said
@@ -124,6 +126,7 @@ def test_tolerance_of_zero_or_of_one_and_more_is_refused_before_any_run(command:
 
 
 def test_samples_that_would_fill_the_memory_are_refused_with_the_largest_number(tmp_path, capsys):
+    """A reference may have 5 million samples times bodies."""
     out = tmp_path / "ref.csv"
     status, said = ended(capsys, "reference", "four_bar_chain[20]", "--out", str(out), "--samples", "1000000")
     assert f"--samples: at least 2 and at most {5_000_000 // 41} for the 41 bodies of four_bar_chain" in said

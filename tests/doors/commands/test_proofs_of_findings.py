@@ -25,24 +25,33 @@ SLEEPER = "import os, pathlib, time; pathlib.Path({path!r}).write_text(str(os.ge
 PATIENCE = 60.0  # s of waiting, on a loaded machine
 
 
-def proof(script: str) -> Finding:
-    return Finding(**TEXTS, package="numpy", script=script, wrong_above=1.0)
+@pytest.mark.parametrize(
+    ("script", "status"),
+    [
+        ("print('of 0.5, the error is', 2.5)", Status.PRESENT),
+        ("print(7.0); print(0.5)", Status.GONE),
+        ("print(float('nan'))", Status.PRESENT),
+    ],
+    ids=["above the limit", "below it", "not a number"],
+)
+def test_engine_has_the_error_if_the_last_number_of_its_proof_exceeds_the_limit(script: str, status: Status):
+    """The limit is 1: the error is present if the last printed number is larger or NaN, otherwise it is
+    gone."""
+    assert Finding(**TEXTS, package="numpy", script=script, wrong_above=1.0).recheck().status is status
 
 
 @pytest.mark.parametrize(
-    ("script", "status", "says"),
+    ("script", "says"),
     [
-        ("print('error', 2.5)", Status.PRESENT, ""),
-        ("print(0.5)", Status.GONE, ""),
-        ("print(float('nan'))", Status.PRESENT, "nan"),
-        ("print('none')", Status.UNCLEAR, "the script gave no number: none"),
-        ("raise ValueError('no such joint')", Status.UNCLEAR, "no such joint"),
-        ("import os; os._exit(3)", Status.UNCLEAR, "ended with exit status 3"),
+        ("print('none')", "the script gave no number: none"),
+        ("raise ValueError('no such joint')", "no such joint"),
+        ("import os; os._exit(3)", "ended with exit status 3"),
     ],
+    ids=["no number", "error", "exit status"],
 )
-def test_the_last_printed_number_of_a_script_decides(script: str, status: Status, says: str):
-    answer = proof(script).recheck()
-    assert answer.status is status and says in answer.words
+def test_proof_without_a_number_is_unclear_and_the_answer_has_the_reason(script: str, says: str):
+    answer = Finding(**TEXTS, package="numpy", script=script, wrong_above=1.0).recheck()
+    assert answer.status is Status.UNCLEAR and says in answer.words
 
 
 def wait_for(what: Any) -> Any:
@@ -53,8 +62,9 @@ def wait_for(what: Any) -> Any:
     return found
 
 
-def test_killed_command_leaves_no_script(tmp_path: Path):
-    """The script writes its process number and sleeps; SIGKILL ends its parent, after which it ends, too."""
+def test_script_of_a_proof_ends_when_the_command_that_runs_it_is_killed(tmp_path: Path):
+    """The script writes its process number and sleeps 600 s. SIGKILL ends its parent; within 60 s, on a
+    loaded machine, the script's process has ended, too."""
     told = tmp_path / "number"
     script = SLEEPER.format(path=str(told))
     parent = subprocess.Popen([sys.executable, "-c", PARENT.format(script=script)], cwd=os.getcwd())

@@ -42,6 +42,7 @@ def test_output_to_a_closed_pipe_ends_with_one_sentence(program, words, capsys):
     assert capsys.readouterr().err == "standard output: Broken pipe\n"
 
 
+# escape, bell, an 8-bit escape, carriage return, right-to-left override
 @pytest.mark.parametrize("program", PROGRAMS)
 @pytest.mark.parametrize("word", ["\x1b[31mred", "a\x07b", "c\x9b2Jd", "r\rs", "\u202eback"])
 def test_errors_print_no_control_character_of_a_word_of_the_command_line(program, word, tmp_path, capsys):
@@ -51,11 +52,12 @@ def test_errors_print_no_control_character_of_a_word_of_the_command_line(program
             assert PROGRAMS[program](words) == 2
     said = capsys.readouterr()
     assert said.err.count("\n") >= 4, "a sentence for each command line"
-    acting = [c for c in set(said.out + said.err) - {"\n", "\t"} if not c.isprintable()]
-    assert not acting, ascii(acting)
+    control = [c for c in set(said.out + said.err) - {"\n", "\t"} if not c.isprintable()]
+    assert not control, ascii(control)
 
 
 def test_errors_print_no_control_character_of_a_scene_file(tmp_path, capsys):
+    """An escape character stands behind a value, or in a key, of which the message would quote it."""
     (tmp_path / "faulty.toml").write_text('name = "x" \x1b[31m\n')
     (tmp_path / "key.toml").write_text('"na\\u001bme" = "x"\n')
     for name in ("faulty", "key"):

@@ -16,7 +16,9 @@ NEARLY_SINGULAR = """<mujoco><worldbody><body name="a"><joint axis="0 1 0"/>
 <inertial pos="0 0 0" mass="1e-12" diaginertia="1e-13 1e-13 1e-13"/></body></body></worldbody></mujoco>"""
 
 
-@pytest.mark.parametrize(("text", "status"), [(NOT_A_NUMBER, 2), (NEARLY_SINGULAR, 0)])
+@pytest.mark.parametrize(
+    ("text", "status"), [(NOT_A_NUMBER, 2), (NEARLY_SINGULAR, 0)], ids=["refused", "imported"]
+)
 def test_import_of_a_file_that_mujoco_warns_about_leaves_no_log(text, status, tmp_path, monkeypatch, capfd):
     """MuJoCo writes its warnings to the terminal and to MUJOCO_LOG.TXT in the working folder."""
     file, here = tmp_path / "a.xml", tmp_path / "here"
@@ -31,9 +33,10 @@ def test_import_of_a_file_that_mujoco_warns_about_leaves_no_log(text, status, tm
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", ["four_bar", "four_bar_gravity"])
 def test_runs_and_modes_of_engines_leave_no_file(scene, tmp_path, monkeypatch):
-    """The commands are not refused (2); Exudyn's defaults end early on these scenes (1)."""
+    """The commands do run, and are not refused with status 2: Exudyn's defaults end early on these scenes,
+    which is status 1, and `modes` finds equilibria."""
     monkeypatch.chdir(tmp_path)
     engines = [word for name in ("mbref", "mujoco", "pinocchio", "exudyn") for word in ("--engine", name)]
     assert crosscheck(["run", scene, *engines, "--samples", "3", "--duration", "0.01"]) == 1
-    assert crosscheck(["modes", "planar_slider_crank_gravity", *engines[2:]]) < 2
+    assert crosscheck(["modes", "planar_slider_crank_gravity", *engines[2:]]) in (0, 1)
     assert not os.listdir(tmp_path)

@@ -52,14 +52,18 @@ def measured(version: str, factor: float = 1.0, seconds: float = 1.0, card: str 
         ({"seconds": 3.0}, [("cost", "time 1.00e+00 s → 3.00e+00 s")]),
         ({"card": "fail"}, [("check", "pass → fail (0.1 → 0.1)")]),
     ],
+    ids=["nothing", "noise", "gravity", "time", "check"],
 )
 def test_changes_beyond_noise_are_named_by_kind(changed: dict[str, Any], kinds: list[tuple[str, str]]):
+    """Noise is a relative change of 1e-9 of the gravity, or half as much time again. Gravity 1.5 times too
+    large changes accelerations by (1.5 - 1) / 1.5 = 0.33 of the largest, and their error from 0 to 0.5."""
     found = between(measured("1.0"), measured("1.1", **changed), [STONE])
     assert [(one.kind, one.change) for one in found] == kinds
 
 
 def test_bisection_finds_the_change_past_versions_that_cannot_be_installed():
-    """The change is in the 13th of 20 versions; log₂ 20 measurements, and some more for skipped ones."""
+    """Versions are 1.0 to 1.19, and 1.13 changes gravity. Halving takes 2 + log₂ 20 = 6 measurements, and up
+    to two more beside the missing 1.9 and 1.10. Among the first five versions nothing changes."""
     known = [f"1.{k}" for k in range(20)]
 
     def measure(version: str) -> Measured:
@@ -75,25 +79,46 @@ def test_bisection_finds_the_change_past_versions_that_cannot_be_installed():
     assert found.made <= 8 and bisected(known[:5], measure, changes).new is None
 
 
+@pytest.fixture(scope="module")
+def four_versions(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a scene of a falling stone and wheels of four versions of an engine.
+
+    1.1 has another default step, 1.2 gravity 1.5 times too large, and 1.3 another name of a function.
+    """
+    folder = tmp_path_factory.mktemp("versions")
+    STONE.save(folder / "stone.toml")
+    write_wheel(folder, "1.0")
+    write_wheel(folder, "1.1", step=0.2)
+    write_wheel(folder, "1.2", factor=1.5, step=0.2)
+    write_wheel(folder, "1.3", factor=1.5, step=0.2, fall="drop")
+    return folder
+
+
 @pytest.mark.slow
-def test_changed_gravity_default_and_lost_function_are_found_and_the_release_is_named(tmp_path: Path):
-    """1.1 has another default step, 1.2 gravity 1.5 times too large, 1.3 another name of a function."""
-    STONE.save(tmp_path / "stone.toml")
-    stone = str(tmp_path / "stone.toml")
-    write_wheel(tmp_path, "1.0")
-    write_wheel(tmp_path, "1.1", step=0.2)
-    write_wheel(tmp_path, "1.2", factor=1.5, step=0.2)
-    write_wheel(tmp_path, "1.3", factor=1.5, step=0.2, fall="drop")
-    status, found, said = versions(tmp_path, f"{PACKAGE}==1.0", f"{PACKAGE}==1.3", stone)
+def test_versions_lists_a_changed_acceleration_default_and_name_of_a_function(four_versions: Path):
+    """From 1.0 to 1.3 the stone's acceleration, and so its motion, becomes wrong by 0.5 of gravity."""
+    stone = str(four_versions / "stone.toml")
+    status, found, said = versions(four_versions, f"{PACKAGE}==1.0", f"{PACKAGE}==1.3", stone)
     assert status == 1, said
     kinds = {change["kind"]: change for change in found["changes"] if change["kind"] != "cost"}
     assert set(kinds) == {"accelerations", "error", "default", "API"}
     assert kinds["accelerations"]["change"].endswith("error 0 → 0.5")
     assert kinds["API"]["place"] == "falling_engine.fall"
     assert kinds["default"]["change"] == "0.1 → 0.2"
-    status, found, said = versions(tmp_path, PACKAGE, stone, "--bisect", "1.0..1.3")
+
+
+@pytest.mark.slow
+def test_bisection_by_the_command_names_the_release_with_the_wrong_gravity(four_versions: Path):
+    """Gravity changed from 1.1 to 1.2. The default step of 1.1 is none that a run uses."""
+    stone = str(four_versions / "stone.toml")
+    status, found, said = versions(four_versions, PACKAGE, stone, "--bisect", "1.0..1.3")
     assert status == 1 and (found["old"], found["new"]) == ("1.1", "1.2"), said
-    status, found, said = versions(tmp_path, f"{PACKAGE}==1.0", f"{PACKAGE}==1.4", stone)
+
+
+@pytest.mark.slow
+def test_version_that_does_not_exist_is_refused_with_the_known_versions(four_versions: Path):
+    stone = str(four_versions / "stone.toml")
+    status, _, said = versions(four_versions, f"{PACKAGE}==1.0", f"{PACKAGE}==1.4", stone)
     assert status == 2 and "there is no such version; known: 1.0, 1.1, 1.2, 1.3" in said
 
 
@@ -115,12 +140,14 @@ def test_faulty_requests_are_refused_before_anything_is_installed(
     assert says in capsys.readouterr().err
 
 
-def test_names_of_a_library_in_an_adapter_are_found_under_their_aliases():
+def test_names_that_an_adapter_uses_of_a_library_are_found_under_their_full_names():
+    """`t` is an alias of one.two; json belongs to Python's own library."""
     source = "import one.two as t\nfrom three import four\nimport json\nt.a.b(json.x)\nfour().c\nself.t.d\n"
     assert set(used_names(source)) == {"one.two", "three.four", "one.two.a", "one.two.a.b"}
 
 
-def test_defaults_of_signatures_and_objects_are_read_and_missing_ones_named():
+def test_defaults_of_functions_and_objects_are_read_and_a_missing_name_is_reported():
+    """Python's documentation states skipkeys=False of json.dumps, and 28 digits of a decimal context."""
     assert dict(defaults_of("json.dumps"))["json.dumps(skipkeys)"] is False
     assert dict(defaults_of("decimal.Context().prec")) == {"decimal.Context().prec": 28}
     assert dict(defaults_of("json.nothing")) == {"json.nothing": "missing"}

@@ -29,6 +29,7 @@ def _own_children() -> Iterator[None]:
 
 @pytest.mark.parametrize("scene", [each.scene for each in specimens()], ids=lambda scene: scene.name)
 def test_run_without_samples_has_no_metric_and_an_infinite_opening(scene: Scene):
+    """On each mechanism of the conformance suite; gap (m) and angle (rad) are infinite."""
     run = Trajectory.failed(
         scene=scene.name, engine="by hand", version="", method="", settings={},
         bodies=tuple(body.name for body in scene.body), outcome=Outcome.TIMED_OUT, message="no result",
@@ -37,7 +38,8 @@ def test_run_without_samples_has_no_metric_and_an_infinite_opening(scene: Scene)
     assert opening(scene, run) == (math.inf, math.inf)
 
 
-def test_comparison_keeps_the_row_of_an_engine_that_crashes_before_its_first_sample():
+def test_comparison_has_a_row_an_answer_and_a_record_of_an_engine_that_crashes_before_its_first_sample():
+    """The engine raises an error in each run. The document is JSON without NaN."""
     scene = arms(1.0, coupled=True).with_(duration=0.1)
     found = crosscheck.compare(scene, FAILING, samples=3, reference_time=1.0)
     assert [row["outcome"] for row in found.rows] == ["CRASHED"] and found.rows[0]["error"] is None
@@ -61,8 +63,11 @@ def printed(capsys: pytest.CaptureFixture[str], folder: Path, name: str, *option
         (["tune"], "no run completes"),
         (["tune", "--closure", "1mm"], "no run completes"),
     ],
+    ids=["run", "tune", "tune to a closure"],
 )
-def test_command_prints_that_an_engine_crashed(command: list[str], says: str, tmp_path: Path, capsys):
+def test_command_prints_that_no_run_of_a_crashing_engine_completed(
+    command: list[str], says: str, tmp_path: Path, capsys
+):
     assert says in " ".join(printed(capsys, tmp_path, *command).split())
 
 

@@ -37,23 +37,27 @@ def failures(step: Step, scenes: list[str], fault: str = "") -> list[str]:
 @pytest.mark.slow
 @pytest.mark.parametrize("step", [euler, symplectic_euler, midpoint])
 @pytest.mark.parametrize("scene", RUNS)
-def test_engine_of_low_order_with_right_equations_conforms(step: Step, scene: str):
+def test_engine_of_low_order_with_right_equations_violates_no_check(step: Step, scene: str):
+    """Euler's methods have order 1, the midpoint method order 2; their errors are not those of an engine."""
     assert failures(step, [scene]) == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("step", [euler, symplectic_euler, midpoint])
 @pytest.mark.parametrize("fault", FAULTS)
-def test_engine_of_low_order_with_a_fault_does_not_conform(step: Step, fault: str):
+def test_fault_in_an_engine_of_low_order_violates_a_check_on_the_scene_that_shows_it(step: Step, fault: str):
+    """A fault in the equations does not pass as an error of the steps. SHOWN_ON names the scenes."""
     assert failures(step, [SHOWN_ON[fault]], fault)
 
 
 @pytest.mark.parametrize("step", [euler, midpoint])
-def test_free_fall_of_low_order_conforms_and_with_twice_its_weight_it_fails(step: Step):
+def test_free_fall_by_low_order_violates_no_check_but_does_with_twice_the_gravity(step: Step):
+    """The same engine with one planted fault."""
     assert failures(step, ["free_fall"]) == []
     assert failures(step, ["free_fall"], "gravity acts twice")
 
 
 @pytest.mark.parametrize("step", [symplectic_euler, midpoint])
-def test_engine_of_low_order_that_ignores_armature_does_not_conform(step: Step):
+def test_engine_of_low_order_that_ignores_armature_violates_a_check_on_a_pendulum_with_armature(step: Step):
+    """The gate's case of the slow tests above."""
     assert failures(step, ["armature pendulum"], "armature is ignored")

@@ -21,6 +21,7 @@ MOST = 2000  # characters that a message may have
 @pytest.mark.parametrize("name", ["TALKATIVE", "FAILING"])
 def test_record_has_the_beginning_of_a_message_of_10_megabytes(name: str, tmp_path: Path):
     case = Case(resting("rest"), TIMES, f"tests.helpers.still_engines:{name}", SETTING)
+    # TALKATIVE gives the text as the run's message, FAILING as the text of an error
     [record] = study([case], records_path=tmp_path / "records.jsonl")
     assert LONG[:500] in record["message"] and len(record["message"]) < MOST
     stored = (tmp_path / "records.jsonl").read_text()
@@ -30,6 +31,7 @@ def test_record_has_the_beginning_of_a_message_of_10_megabytes(name: str, tmp_pa
 
 @pytest.mark.parametrize("name", ["TALKATIVE", "FAILING"])
 def test_message_is_cut_alike_in_this_process_and_in_a_child_process(name: str):
+    """Either process keeps fewer than 2000 of its 10 million characters."""
     called = f"tests.helpers.still_engines:{name}"
     own = InProcess(engine(called), called).observe(resting("rest"), TIMES, SETTING).value
     assert own.message == run_isolated(called, resting("rest"), TIMES, SETTING, 60.0).message
@@ -38,6 +40,7 @@ def test_message_is_cut_alike_in_this_process_and_in_a_child_process(name: str):
 
 
 def test_reason_of_10_megabytes_for_a_refusal_is_cut_to_its_beginning():
+    """Both ways by which the reason arrives from a child process cut it alike."""
     called = "tests.helpers.still_engines:REFUSING"
     _, cannot, _ = capabilities(called, resting("rest"), 60.0)
     assert cannot is not None and len(str(cannot)) < MOST and LONG[:500] in cannot.reason
