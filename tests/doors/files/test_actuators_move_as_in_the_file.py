@@ -8,7 +8,7 @@ import pytest
 
 import mbref
 
-ROUNDED = 1e-9  # relative; natural angles and stiffnesses are divided and multiplied again
+ROUNDED = 1e-9  # relative to the largest acceleration; stiffnesses of 1e3 magnify rounding of angles
 
 
 def pendulum(k: int) -> str:
@@ -130,6 +130,7 @@ def test_wheel_on_a_spring_and_a_servo_swings_about_their_common_natural_angle(f
     ],
 )
 def test_an_actuator_that_a_scene_cannot_have_is_refused_or_left_out_on_request(files, actuator, key, says):
+    """The request is --without motors, which the refusal names; the scene then has no load."""
     text = model_of([actuator], f"name='k' {key}" if key else "")
     text = text.replace("</worldbody>", "<site name='there'/></worldbody>")
     words = ("--keyframe", "k") if key else ()
@@ -140,7 +141,8 @@ def test_an_actuator_that_a_scene_cannot_have_is_refused_or_left_out_on_request(
 
 
 def test_controls_and_forces_of_motors_are_clipped_as_in_mujoco(files):
-    """The ranges are of a control, of an actuator's force and of a joint's force."""
+    """The ranges are of a control, of an actuator's force and of a joint's force; MuJoCo's qacc is the
+    truth."""
     parts = [
         "<motor joint='JOINT' ctrlrange='-1 1' ctrllimited='true' gear='2'/>",
         "<motor joint='JOINT' forcerange='-0.5 0.5' gear='2'/>",
@@ -154,8 +156,9 @@ def test_controls_and_forces_of_motors_are_clipped_as_in_mujoco(files):
     assert of_scene(scene) == pytest.approx(theirs, abs=ROUNDED * np.abs(theirs).max())
 
 
-def test_keyframes_are_found_by_name_and_by_number(files):
-    """The file has the keyframe "other" at zero, and one at 0.5 rad whose only name is its number, 1."""
+def test_keyframes_are_found_by_name_and_by_number_and_an_unknown_one_is_refused_with_both(files):
+    """The file has the keyframe "other" at zero, and one at 0.5 rad whose only name is its number, 1. A turn
+    of 0.5 rad about y is the quaternion (cos 0.25, 0, sin 0.25, 0)."""
     text = model_of(["<motor joint='JOINT'/>"], "qpos='0.5'")
     by_number = files.scene(text, "a.xml", "--keyframe", "1")[0]
     assert by_number.body[0].orientation[2] == pytest.approx(np.sin(0.25), rel=1e-12)

@@ -51,6 +51,7 @@ BY_MUJOCO = {  # numbers that MuJoCo's own reader refuses first
 @pytest.mark.parametrize("number", ["1e300", "inf", "-inf", "nan"])
 @pytest.mark.parametrize(("text", "name", "old", "new", "part"), PLACES)
 def test_part_with_a_number_that_is_huge_or_not_finite_is_named(files, text, name, old, new, part, number):
+    """The error begins with the body, link or joint, or with the refusal by MuJoCo's own reader."""
     expected = "MuJoCo cannot read it: " if (old, number) in BY_MUJOCO else f"{part}: "
     assert expected in files.refusal(text.replace(old, new.format(number)), name)
 
@@ -66,6 +67,7 @@ NO_XML = [b"", b"\xff\xfe\x00<", bytes(range(256)), b"<robot", b"<sdf version='1
 @pytest.mark.parametrize(("name", "says"), READERS)
 @pytest.mark.parametrize("text", NO_XML)
 def test_a_file_that_is_no_xml_is_refused_by_the_reader_of_its_format(files, name, says, text):
+    """The suffix of the name decides the format: MuJoCo reads .xml."""
     assert says in files.refusal(text, name)
 
 
@@ -73,12 +75,13 @@ def test_a_file_that_is_no_xml_is_refused_by_the_reader_of_its_format(files, nam
     ("name", "says"),
     [("a.xml", "has no body"), ("a.urdf", "MuJoCo cannot read it: "), ("a.sdf", "has no model")],
 )
-def test_an_mjcf_file_without_bodies_is_refused_in_every_format(files, name, says):
+def test_an_empty_mjcf_model_is_refused_under_the_suffix_of_each_format(files, name, says):
+    """MuJoCo reads MJCF also from .urdf files: both have no body to offer."""
     assert says in files.refusal(b"<mujoco/>", name)
 
 
 @pytest.mark.parametrize("name", ["a.urdf", "a.sdf"])
-def test_an_unknown_encoding_is_refused(files, name):
+def test_an_unknown_encoding_is_refused_with_a_sentence_on_the_encoding(files, name):
     text = {"a.urdf": ROBOT, "a.sdf": MODEL}[name]
     assert "encoding" in files.refusal(f'<?xml version="1.0" encoding="none-such"?>{text}', name)
 
@@ -92,14 +95,15 @@ def test_a_file_in_utf_16_is_read_with_the_names_of_its_links(files):
 
 @pytest.mark.parametrize("deep", [300, 5000])
 def test_elements_nested_too_deep_are_refused_with_their_depth(files, deep):
-    """The root is one more level, and in SDF the link in the last model is another one."""
+    """The root element is one level more. In SDF the link in the innermost model is another one."""
     urdf = ROBOT.replace("</robot>", f"{'<more>' * deep}{'</more>' * deep}</robot>")
     assert f"nested {deep + 1} deep; at most" in files.refusal(urdf, "a.urdf")
     models = "".join(f"<model name='m{k}'><link name='l'/>" for k in range(deep)) + "</model>" * deep
     assert f"nested {deep + 2} deep; at most" in files.refusal(f"<sdf version='1.9'>{models}</sdf>", "a.sdf")
 
 
-def test_a_chain_of_300_links_is_refused_with_its_length(files):
+def test_a_chain_of_300_links_or_bodies_is_refused_with_its_length(files):
+    """Links in URDF, bodies in MJCF."""
     many = 300
     links = "".join(f'<link name="l{k}"/>' for k in range(many + 1))
     joints = "".join(
@@ -134,6 +138,7 @@ def test_a_broken_configuration_of_an_included_model_is_named(files, configurati
 
 
 def test_models_that_include_each_other_400_deep_are_refused(files):
+    """Each of 400 files includes the next one."""
     for k in range(400):
         include = f"<include><uri>m{k + 1}.sdf</uri></include>"
         (files.folder / f"m{k}.sdf").write_text(

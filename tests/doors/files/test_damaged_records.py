@@ -57,17 +57,20 @@ def refused(capsys: pytest.CaptureFixture[str], place: Path) -> str:
 
 @pytest.mark.parametrize("content", FOREIGN, ids=lambda content: ascii(content[:8]))
 def test_records_file_of_other_content_is_named(content, tmp_path, capsys):
+    """Null, deep or other JSON, no UTF-8, an escape character: `report --render` and `diff` refuse them."""
     assert "holds no records" in refused(capsys, folder(tmp_path / "r", content))
 
 
 @pytest.mark.parametrize(("field", "value"), FAULTS, ids=lambda x: str(x)[:12])
 def test_faulty_field_of_a_record_is_named(field, value, tmp_path, capsys):
+    """The field is missing (None) or has a value of another kind; k1 is the record's key."""
     said = refused(capsys, folder(tmp_path / "r", record_with(field, value)))
     assert f"record 'k1': {field}" in said
 
 
 @pytest.mark.parametrize("name", ["timings.jsonl", "truths.jsonl", "motions.jsonl", "conformance/x.json"])
 def test_faulty_file_beside_right_records_is_named(name, tmp_path, capsys):
+    """Its line has only a key and a scene."""
     place = folder(tmp_path / "r", record_with("seed", 0))
     (place / name).parent.mkdir(exist_ok=True)
     (place / name).write_text('{"key": "k1", "scene": "four_bar"}\n')
@@ -86,7 +89,8 @@ def test_verdicts_of_a_suite_that_are_no_json_are_named(content, tmp_path, capsy
     assert "x.json: is not JSON" in capsys.readouterr().err
 
 
-def test_commands_that_print_records_name_their_missing_field(tmp_path, capsys):
+def test_closed_loops_and_convergence_name_the_missing_field_of_a_record(tmp_path, capsys):
+    """The record lacks its cost."""
     faulty = tmp_path / "records.jsonl"
     faulty.write_bytes(record_with("cost"))
     for command in ("closed-loops", "convergence"):

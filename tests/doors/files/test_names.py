@@ -55,7 +55,8 @@ def named(name: str) -> Scene:
 
 
 def test_file_names_of_different_names_differ_and_are_safe_words_of_a_shell(tmp_path):
-    """A plain name stays; letters that are not ASCII, which a shell leaves alone, stay, too."""
+    """`shlex.quote` leaves safe words as they are; it would quote the letter ü, which shells do not. A plain
+    name stays."""
     found = {file_name(name) for name in NAMES}
     assert len(found) == len(NAMES) and file_name("four_bar-2") == "four_bar-2"
     for name in found:
@@ -68,7 +69,8 @@ def test_file_names_of_different_names_differ_and_are_safe_words_of_a_shell(tmp_
 def test_pictures_of_any_name_are_xml_in_the_folder_and_their_legends_show_it(
     name, tmp_path, monkeypatch, capsys
 ):
-    """Names in a legend are no formulas, which matplotlib would set between dollar signs."""
+    """An XML parser reads each picture. Names in a legend are shown letter by letter: what stands between
+    dollar signs is no formula of matplotlib."""
     monkeypatch.chdir(tmp_path)
     named(name).save("scene.toml")
     assert main(["draw", "scene.toml"]) == 0
@@ -96,7 +98,8 @@ def test_control_characters_in_names_and_endless_names_are_refused_in_short_mess
 
 @pytest.mark.parametrize("name", NAMES)
 def test_page_and_markdown_of_a_report_show_a_name_without_acting_on_its_markup(name):
-    """A parser of CommonMark finds no HTML, link or emphasis; backticks of a heading are code on purpose."""
+    """A parser of CommonMark finds no HTML, link or emphasis, and the heading's text is the name without its
+    backticks, which mean code on purpose."""
     card = Card("k-1", name, "right", "✓", {}, name, shlex.join(["crosscheck", "run", name]), name)
     blocks = [
         Heading(name, 2),
@@ -109,8 +112,8 @@ def test_page_and_markdown_of_a_report_show_a_name_without_acting_on_its_markup(
     assert "<img src=x" not in html(blocks, {"figure": "<svg/>"}, name)
     tokens = MarkdownIt("commonmark").enable(["table", "strikethrough"]).parse(markdown(blocks, name))
     inner = [token for block in tokens for token in (block, *(block.children or ()))]
-    acting = {"html_inline", "html_block", "link_open", "em_open", "s_open"}
-    assert not {token.type for token in inner} & acting
+    markup = {"html_inline", "html_block", "link_open", "em_open", "s_open"}
+    assert not {token.type for token in inner} & markup
     heading = next(block for block in tokens if block.type == "inline").children
     assert "".join(token.content for token in heading) == name.replace("`", "")
     assert [token.content for token in tokens if token.type == "fence"] == [f"```\n{name}\n"]
@@ -118,6 +121,8 @@ def test_page_and_markdown_of_a_report_show_a_name_without_acting_on_its_markup(
 
 @pytest.mark.parametrize("name", NAMES)
 def test_printed_commands_of_a_report_name_the_scene_file_as_one_word(name):
+    """`shlex.split` reads the commands as a shell does: of a run's card, of the report, and for another
+    path."""
     scene = synthetic.scene().with_(name=name)
     group = SceneRuns(scene, [Run(synthetic.record("mbref", "default", 1e-9, 0.1, a_scene=scene))])
     blocks = [*sections.records.render([group]), *sections.provenance.render([group])]

@@ -42,7 +42,9 @@ def full_disk(size: int) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("command", ["new", "draw", "run", "plot", "assemble"])
-def test_file_that_exists_is_replaced_only_by_force(command, tmp_path, capsys):
+def test_file_that_exists_is_replaced_only_with_force(command, tmp_path, capsys):
+    """Without --force the command returns 2, names the file and the option in one line, and writes
+    nothing."""
     out = tmp_path / f"out{SUFFIX.get(command, '.toml')}"
     out.write_text("my own")
     assert main([*WRITERS[command], str(out)]) == 2
@@ -54,7 +56,8 @@ def test_file_that_exists_is_replaced_only_by_force(command, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("command", ["draw", "run", "assemble"])
-def test_full_disk_leaves_no_part_of_a_file(command, tmp_path, capsys):
+def test_full_disk_leaves_no_part_of_a_file_and_a_file_that_existed_unchanged(command, tmp_path, capsys):
+    """The operating system lets no file have more than 100 bytes."""
     out = tmp_path / f"out{SUFFIX.get(command, '.toml')}"
     with full_disk(100):
         assert main([*WRITERS[command], str(out)]) == 2
@@ -84,7 +87,7 @@ def test_table_is_written_through_a_link_into_its_target_which_keeps_its_permiss
     assert target.stat().st_mode & 0o777 == 0o640
 
 
-def test_picture_with_the_default_name_is_replaced_only_by_force(tmp_path, monkeypatch, capsys):
+def test_picture_with_the_default_name_is_replaced_only_with_force(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["draw", "four_bar"]) == 0
     assert main(["draw", "four_bar"]) == 2
@@ -106,6 +109,7 @@ def test_report_is_not_written_into_a_folder_with_other_files(tmp_path, capsys):
 
 @pytest.mark.parametrize("path", ["no/such/folder/out.svg", "", ".", "x" * 300 + ".svg", "a\nb/c.svg"])
 def test_path_that_cannot_be_written_is_refused_and_nothing_is_written(path, tmp_path, monkeypatch, capsys):
+    """A missing folder, no name, a folder, a name of more than 255 bytes, a line break: --out is named."""
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as ended:
         main(["draw", "four_bar", "--out", path])

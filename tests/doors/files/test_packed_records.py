@@ -19,6 +19,7 @@ REPORTS = Path(__file__).parents[3] / "reports"
 
 
 def test_a_packed_folder_renders_as_the_folder_itself_and_has_equal_records(tmp_path, capsys):
+    """`python -m reports.keep` packs a folder of one record; `diff` compares the records."""
     plain, packed = tmp_path / "plain", tmp_path / "packed"
     (plain / "scenes").mkdir(parents=True)
     SCENES["four_bar"]().save(plain / "scenes" / "four_bar.toml")
@@ -33,20 +34,23 @@ def test_a_packed_folder_renders_as_the_folder_itself_and_has_equal_records(tmp_
     assert (packed / "report.md").read_text() == (plain / "report.md").read_text()
 
 
-@pytest.mark.parametrize("words", [["--section", "paper"], []])
-def test_a_pack_without_the_records_of_a_section_is_named(words, capsys):
+@pytest.mark.parametrize("words", [["--section", "paper"], []], ids=["paper", "all sections"])
+def test_a_report_folder_without_the_records_of_the_section_is_named(words, capsys):
+    """The folder has the records of the stability ladders alone."""
     assert report(["--render", str(REPORTS / "stability"), *words]) == 2
     assert str(REPORTS / "stability") in capsys.readouterr().err
 
 
 def test_a_damaged_pack_is_named_in_one_sentence(tmp_path, capsys):
+    """The last 100 bytes of a committed pack are missing."""
     (tmp_path / "records.zip").write_bytes((REPORTS / "kinds" / "records.zip").read_bytes()[:-100])
     assert report(["--render", str(tmp_path)]) == 2
     said = capsys.readouterr().err
     assert "records.zip: is damaged" in said and said.count("\n") == 1
 
 
-def test_a_compressed_file_is_read_and_refused_where_records_are_added(tmp_path):
+def test_a_compressed_file_of_records_is_read_and_refused_where_records_are_added(tmp_path):
+    """The suffix .xz compresses: the file begins with the byte FD of that format."""
     path = tmp_path / "records.jsonl.xz"
     rewrite(path, [RECORD])
     assert list(looked_at(path).values()) == [RECORD] and path.read_bytes()[:1] == b"\xfd"
@@ -54,16 +58,24 @@ def test_a_compressed_file_is_read_and_refused_where_records_are_added(tmp_path)
         stored(path)
 
 
-@pytest.mark.parametrize("damage", [lambda text: text[:-9], lambda text: lzma.compress(b"no record\n")])
-def test_a_damaged_compressed_file_is_named(damage, tmp_path, capsys):
+@pytest.mark.parametrize(
+    ("damage", "says"),
+    [
+        pytest.param(lambda text: text[:-9], "", id="cut"),
+        pytest.param(lambda _: lzma.compress(b"no record\n"), "holds no records", id="no record"),
+    ],
+)
+def test_a_damaged_compressed_file_of_records_is_named(damage, says, tmp_path, capsys):
     path = tmp_path / "records.jsonl.xz"
     rewrite(path, [RECORD])
     path.write_bytes(damage(path.read_bytes()))
     assert crosscheck(["convergence", "--records", str(path)]) == 2
-    assert "records.jsonl.xz: " in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "records.jsonl.xz: " in said and says in said and said.count("\n") == 1
 
 
-def test_committed_reports_have_at_most_6_megabytes_and_one_file_of_records_each():
+def test_committed_reports_have_at_most_6_megabytes_and_no_record_outside_a_pack():
+    """Pictures and pages, which are made from the records, do not count."""
     paths = [path for path in REPORTS.rglob("*") if path.is_file() and "__pycache__" not in path.parts]
     kept = [path for path in paths if path.suffix != ".png" and path.name != "index.html"]
     assert sum(path.stat().st_size for path in kept) < 6e6

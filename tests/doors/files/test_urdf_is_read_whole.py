@@ -68,10 +68,12 @@ def test_an_element_that_closes_a_loop_is_a_joint_of_the_scene(files, tag, kind,
     ],
 )
 def test_a_fault_of_an_element_that_closes_a_loop_is_named(files, loop, says):
+    """An unknown type, no child link, a word for a number, and an unknown link q."""
     assert says in files.refusal(robot(*CRANKS, loop), "r.urdf")
 
 
 def test_elements_that_are_not_read_are_listed_with_their_part(files):
+    """Elements of one name are listed together; <springy> is no element of the format."""
     parts = (
         hinge("ja", "base", "a", "0 0 0", more="<safety_controller k_velocity='1'/>"),
         hinge("jb", "a", "b", "0.3 0 0", more="<springy/>"),
@@ -85,6 +87,7 @@ def test_elements_that_are_not_read_are_listed_with_their_part(files):
 
 
 def test_a_moment_of_inertia_larger_than_the_two_others_together_is_refused(files):
+    """0.5 > 0.1 + 0.2 kg m². The sentence does not name "balanceinertia", an option of MuJoCo alone."""
     text = robot(*CRANKS).replace(MOMENTS, 'ixx="0.1" ixy="0" ixz="0" iyy="0.5" iyz="0" izz="0.2"', 1)
     said = files.refusal(text, "r.urdf")
     assert "link 'a'" in said and "0.1, 0.2, 0.5 kg m²" in said and "balanceinertia" not in said
@@ -92,7 +95,7 @@ def test_a_moment_of_inertia_larger_than_the_two_others_together_is_refused(file
 
 @pytest.mark.parametrize("excess", [0.0, 1e-16, 1e-13, 1e-10])
 def test_inertia_of_a_flat_link_is_read_though_rounding_makes_it_impossible(files, excess):
-    """A moment of 0.3 (1 + excess) = 0.1 + 0.2 kg m² but for a relative rounding of up to 1e-10."""
+    """A flat link has 0.3 = 0.1 + 0.2 kg m²; the largest moment is greater by a relative ``excess``."""
     moments = f'ixx="0.1" ixy="0" ixz="0" iyy="{0.3 * (1 + excess)!r}" iyz="0" izz="0.2"'
     scene, _ = files.scene(robot(*CRANKS).replace(MOMENTS, moments, 1), "r.urdf")
     assert np.diag(scene.body[0].inertia) == pytest.approx(np.diag([0.1, 0.3, 0.2]), rel=1e-8, abs=1e-8)

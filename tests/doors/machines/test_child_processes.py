@@ -72,7 +72,7 @@ def numbers_in(log: Path) -> list[int]:
 
 
 def test_child_process_that_is_killed_between_two_runs_is_replaced(log: Path):
-    """Five runs complete in five processes: SIGKILL ends each process after its run."""
+    """Five runs complete in five processes, whose numbers differ: SIGKILL ends each process after its run."""
     end_idle()
     for _ in range(5):
         run = run_isolated(f"{ENGINES}:LOGGED", resting(), np.array([0.0, 1.0]), Setting("plain", {}), 60.0)
@@ -92,31 +92,40 @@ def test_programs_that_an_engine_started_end_when_the_parent_is_killed(engine: s
     assert all(map(is_gone, processes)), processes
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
-def test_program_ends_when_a_signal_ends_its_parent(number: signal.Signals, tmp_path: Path):
-    """SIGINT and SIGTERM are passed on, and the exit status is the program's, 256 - signal. SIGKILL cannot be
-    passed on; the processes that the program started end, too."""
-    (tmp_path / "waiting_module.py").write_text(WAITING)
-    environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}"}
+def parent_ended_by(number: signal.Signals, folder: Path) -> tuple[int, int, int]:
+    """Return the exit status of a parent that a signal ends, and the numbers of the program that it runs and
+    of the process that the program has started."""
+    (folder / "waiting_module.py").write_text(WAITING)
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{folder}"}
     command = [sys.executable, "-c", PROGRAM, "--option"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment, cwd=tmp_path) as parent:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment, cwd=folder) as parent:
         assert parent.stdout is not None
         program, started, *options = parent.stdout.readline().split()
         parent.send_signal(number)
         status = parent.wait()
-    assert is_gone(int(program)), "the program outlives its parent"
     assert options == [b"--option"]
-    if number is signal.SIGKILL:
-        assert is_gone(int(started)), "a process of the program outlives the parent"
-    else:
-        assert status == 256 - number, "the status is not the program's"
-        os.kill(int(started), signal.SIGKILL)
+    return status, int(program), int(started)
+
+
+def test_program_and_its_processes_end_when_sigkill_ends_the_parent(tmp_path: Path):
+    """SIGKILL cannot be passed on by the parent; the operating system ends its children."""
+    _, program, started = parent_ended_by(signal.SIGKILL, tmp_path)
+    assert is_gone(program) and is_gone(started)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signal_to_the_parent_ends_the_program_whose_exit_status_the_parent_returns(number, tmp_path: Path):
+    """A program that a signal n ends has the status -n, which is 256 - n in a byte."""
+    status, program, started = parent_ended_by(number, tmp_path)
+    os.kill(started, signal.SIGKILL)
+    assert is_gone(program) and status == 256 - number
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["report", "compare"])
 def test_command_that_is_killed_leaves_no_process(command: str, log: Path, tmp_path: Path):
-    """A variable of the environment marks its processes; an engine and its program are among them."""
+    """Its processes have STILL_LOG in their environment. There are more than two: the command, the engine's
+    process and the program that the engine started."""
     options = ["--out", str(tmp_path / "out")] if command == "report" else []
     resting().save(tmp_path / "resting.toml")
     asked = [command, str(tmp_path / "resting.toml"), "--engine", f"{ENGINES}:WAITS_WITH_A_PROGRAM", *options]

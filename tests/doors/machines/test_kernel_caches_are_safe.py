@@ -65,6 +65,7 @@ def test_a_cache_that_others_can_write_is_not_loaded(place, tmp_path):
 @USERS
 @pytest.mark.slow
 def test_folders_of_a_new_cache_have_mode_0700_whatever_the_umask(tmp_path):
+    """The umask 0 would give 0777. The owner's next run loads the kernel without a warning."""
     cache, before = tmp_path / "cache", os.umask(0)
     try:
         run(tmp_path, cache)
@@ -95,6 +96,7 @@ def test_damaged_kernel_is_compiled_again_though_its_file_time_lies_ahead(patter
 
 @USERS
 def test_no_data_are_written_to_or_read_from_a_folder_that_others_can_write(tmp_path, capsys):
+    """The folder has the mode 0777. A folder of mode 0700 beside it is used, and one warning is printed."""
     ours, open_to_all = tmp_path / "cache" / "ours", tmp_path / "cache" / "open"
     checked_file.write(ours / "data", b"stored")
     for folder in (tmp_path, ours.parent):  # which others can reach

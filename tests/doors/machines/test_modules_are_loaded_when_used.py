@@ -17,7 +17,8 @@ print(*(name for name in sys.modules if name.startswith("mbref.taylor")))
 
 
 @pytest.mark.parametrize(("method", "is_used"), [("lm1+projection/rk4", False), ("taylor", True)])
-def test_modules_of_taylor_are_loaded_by_runs_that_use_them(method, is_used):
+def test_modules_of_taylor_are_loaded_only_by_runs_that_use_them(method, is_used):
+    """A new process runs one method and prints the loaded modules of mbref.taylor."""
     plain = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     ended = subprocess.run(
         [sys.executable, "-c", RUN, method], env=plain, capture_output=True, text=True, check=False
