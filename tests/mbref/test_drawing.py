@@ -126,25 +126,6 @@ def test_joints_at_one_place_share_one_label():
     assert {"A", "B", "C, D"} <= set(texts(still(scene)))
 
 
-def test_names_of_bars_that_cross_at_their_middles_do_not_overlap():
-    corners = {"rising": (1.0, 1.0, 0.0), "falling": (1.0, -1.0, 0.0)}
-    joints: list[dict[str, object]] = [
-        {
-            "name": "pin",
-            "type": "revolute",
-            "bodies": ("rising", "falling"),
-            "anchor": (0, 0, 0),
-            "axis": (0, 0, 1),
-        }
-    ]
-    for name, (x, y, _) in corners.items():
-        for sign in (-1, 1):
-            end, ball = (sign * x, sign * y, 0.0), f"{name}{sign}"
-            joints.append({"name": ball, "type": "spherical", "bodies": ("ground", name), "anchor": end})
-    bodies = [{"name": name, "position": (0.0, 0.0, 0.0)} for name in corners]
-    assert not overlapping(labels(still(Scene(name="scissors", body=bodies, joint=joints))))
-
-
 def test_bars_of_an_animation_keep_their_length_in_every_frame(turning):
     """The mechanism turns as one rigid body: lengths in px change by less than three times the 0.1 px to
     which coordinates are printed, while ends move by more than 50 px."""

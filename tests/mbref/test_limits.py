@@ -1,4 +1,4 @@
-"""Limits: every number that compiled code could not bear is refused by its name."""
+"""Limits: a number outside its interval is refused by its name."""
 
 import math
 
@@ -31,7 +31,7 @@ def test_limit_that_is_no_finite_number_in_its_interval_is_refused_by_name(name,
 
 
 @pytest.mark.parametrize(("name", "value"), [("rtol", 0.0), ("rtol", 1.0), ("atol", 0.0), ("violation", 0.0)])
-def test_limit_of_zero_or_one_that_no_run_could_keep_is_refused(name, value):
+def test_tolerance_of_zero_and_relative_tolerance_of_one_are_refused(name, value):
     with pytest.raises(ValueError, match=f"^{name}: must be "):
         Limits(**{name: value})
 
@@ -39,12 +39,12 @@ def test_limit_of_zero_or_one_that_no_run_could_keep_is_refused(name, value):
 @pytest.mark.parametrize(
     "name", ["first_step", "smallest_step", "forced_step", "largest_step", "largest_turn"]
 )
-def test_step_limit_of_zero_means_no_limit(name):
+def test_step_limit_of_zero_which_means_no_limit_is_accepted(name):
     assert getattr(Limits(**{name: 0}), name) == 0.0
 
 
 @pytest.mark.parametrize("value", [0, -1, 1.5, 100.0, 2**63, True, "9", None], ids=repr)
-def test_steps_are_counted_in_whole_numbers(value):
+def test_largest_number_of_steps_that_is_no_positive_whole_number_is_refused(value):
     with pytest.raises(ValueError, match=r"^most_steps: must be a whole number from 1"):
         Limits(most_steps=value)
 
@@ -54,7 +54,7 @@ def test_unknown_kind_of_code_is_refused_with_the_three_known():
         Limits(code="fast")
 
 
-def test_numbers_of_numpy_are_stored_as_python_s():
+def test_numpy_numbers_are_stored_as_python_floats_and_integers():
     limits = Limits(rtol=np.float32(0.5), atol=np.int64(1), most_steps=np.int32(7))
     assert [type(x) for x in (limits.rtol, limits.atol, limits.most_steps)] == [float, float, int]
     assert limits == Limits(rtol=0.5, atol=1.0, most_steps=7)

@@ -1,4 +1,5 @@
-"""Record files: appended records are stored whole, other lines are left alone, a full disk loses nothing."""
+"""Record files: appended records are stored whole, other lines are left unchanged, a full disk loses
+nothing."""
 
 from __future__ import annotations
 
@@ -59,6 +60,7 @@ def test_lines_that_are_no_records_are_reported_by_number_and_kept(
 
 
 def test_only_a_line_cut_short_at_the_end_is_removed(tmp_path: Path):
+    """``stored`` leaves it out, and a record that is appended replaces it."""
     path = tmp_path / "runs.jsonl"
     path.write_text('{"key": "a"}\n{"key": "cut sho')
     assert set(stored(path)) == {"a"}
@@ -122,7 +124,7 @@ def test_write_that_fails_half_way_leaves_whole_lines(tmp_path: Path):
     assert path.read_text() == '{"key": "a"}\n'
 
 
-def write_for_ever(path: str) -> None:
+def append_until_killed(path: str) -> None:
     """Append records with the keys 0, 1, 2 …, from the first that the file lacks."""
     for k in range(len(stored(path)), 1_000_000):
         append(path, {"key": str(k), "long": "x" * 5000})
@@ -132,7 +134,7 @@ def test_five_killed_writers_leave_every_record_once_and_in_order(tmp_path: Path
     """Each is killed after at least 50 kB; a record has about 5 kB."""
     path = tmp_path / "runs.jsonl"
     for _ in range(5):
-        process = multiprocessing.get_context("fork").Process(target=write_for_ever, args=(str(path),))
+        process = multiprocessing.get_context("fork").Process(target=append_until_killed, args=(str(path),))
         process.start()
         before = path.stat().st_size if path.exists() else 0
         while not path.exists() or path.stat().st_size < before + 50_000:

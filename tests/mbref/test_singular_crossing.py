@@ -325,19 +325,6 @@ def test_driver_that_turns_back_before_the_flat_position_returns_to_the_start(di
         assert moved < 1e-14 / distance
 
 
-def test_crossings_of_two_loops_that_follow_each_other_in_a_step_are_recorded():
-    """At 3 rad/s a crank from the angle α is flat at (k π - α) / 3 s. Before, two crossings in one step,
-    after which the determinant has its first sign, were missed."""
-    for ahead in np.linspace(0.05, 1.5, 40):
-        scene = leaning(((0.5, 0.5), (0.4, 0.5 + float(ahead))))
-        scene = scene.with_(driver=(Driver(joint="A0", polynomial=(0.0, 3.0)),))
-        times = sorted((k * math.pi - angle) / 3.0 for angle in (0.5, 0.5 + ahead) for k in range(1, 6))
-        run = simulate(scene, "taylor", [4.0])
-        assert run.outcome.label == "COMPLETED", run.message
-        found = [crossing.time for crossing in run.crossings]
-        assert found == pytest.approx([t for t in times if t < 4.0], abs=1e-9), ahead
-
-
 def test_message_counts_the_crossings_of_a_motion():
     """The heavy crank of a slider-crank passes some in 5 s."""
     run = simulate(planar_slider_crank_heavy(), "taylor", [5.0])

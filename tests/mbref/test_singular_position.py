@@ -3,20 +3,17 @@ after it."""
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import closed_form
 from mbref import Limits, simulate
-from mbref.kernels.layout import SINGULAR_AHEAD
 from mbref.method import MOST_BODIES, Method, default_method
 from mbref.scene import Scene
 from mbref.scenes import SCENES, find_scene
 from mbref.scenes.five_bar import five_bar_gravity
 from mbref.scenes.four_bar import four_bar_gravity
 from mbref.scenes.planar_slider_crank import slider_crank
-from mbref.simulation.runs import start_run
 
 WATCHING = (
     "alf-dual+projection",
@@ -140,22 +137,6 @@ def test_chain_of_slider_cranks_completes_though_single_pivots_vanish(loops, rto
     assert measure(scene, run, closed_form(scene))["error"] < 100.0 * rtol
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("loops", [20, 30, 40])
-def test_large_chains_of_slider_cranks_complete_and_of_four_bars_end_flat(loops):
-    """Four-bars are singular at a quarter turn of θ'' = W sin θ, W of the scene's docstring, from -1 rad/s;
-    slider-cranks never are."""
-    times = np.linspace(0.0, 0.5, 3)
-    run = simulate(find_scene(f"slider_crank_chain[{loops}]"), "alf-dual+projection", times)
-    assert run.outcome.name == "COMPLETED", run.message
-    flat = simulate(find_scene(f"four_bar_chain[{loops}]"), "alf-dual+projection", [2.0])
-    gain = 9.81 * ((loops + 1) / 2 + loops) / ((loops + 1) / 3 + loops)
-    turn = lambda t, y: (y[1], gain * np.sin(y[0]))  # noqa: E731
-    ends = solve_ivp(turn, (0.0, 2.0), (0.0, 1.0), events=lambda t, y: y[0] - np.pi / 2, rtol=1e-10)
-    assert flat.outcome.name == "SINGULAR_POSITION", flat.message
-    assert flat.t_end == pytest.approx(ends.t_events[0][0], abs=5e-4)
-
-
 @pytest.mark.parametrize("distance", [3e-2, 1e-1])
 def test_swing_that_turns_back_before_the_flat_position_is_completed_by_projection(distance):
     """Released ``distance`` (rad) from it; nothing is crossed, and the closed form is met to 1000 times rtol,
@@ -189,16 +170,6 @@ def test_default_method_is_taylor_up_to_100_bodies_and_alf_dual_beyond():
     assert len(few.body) <= MOST_BODIES < len(many.body)
     assert default_method(few) == "taylor" and default_method(many) == "alf-dual+projection/dop853"
     assert simulate(few, times=[0.01]).method == "taylor"
-
-
-def test_kernels_return_before_the_step_in_which_the_crossing_lies():
-    """The clock stands before the closed form's first crossing; the end of the step that was attempted is
-    behind it."""
-    scene, end = LOOPS["four"]
-    run = start_run(scene, Method.parse("alf-dual+projection"), np.array([end]), Limits())
-    status, _ = run.stepper.advance(None)
-    clock = run.memory.loop.clock
-    assert status == SINGULAR_AHEAD and clock.time < first_crossing(scene, end) < clock.attempt_end
 
 
 @pytest.mark.parametrize("name", ["point_pendulum", "bricard_thin"])

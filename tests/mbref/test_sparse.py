@@ -24,11 +24,8 @@ from mbref.linear_algebra.sparse_cholesky import (
 )
 from mbref.linear_algebra.sparse_lu import factorise_product
 from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
-from mbref.method import Method
 from mbref.scenes import find_scene
-from mbref.simulation.runs import start_run
 from mbref.simulation.simulate import Limits, simulate
-from mbref.stepping.ranks import MOST_RANKED_ROWS, are_clear
 
 
 @given(bodies=st.integers(1, 12), rows=st.integers(1, 40), seed=st.integers(0, 999))
@@ -220,22 +217,3 @@ def test_shares_of_redundant_rows_are_squares_of_left_null_vectors():
     assert found.rank == 4
     np.testing.assert_allclose(found.shares, np.sum(left[:, 4:] ** 2, axis=1), atol=1e-6)
     assert found.shares[5] < 1e-12
-
-
-@pytest.mark.parametrize("stabilisation", ["projection", "none"])
-def test_many_independent_rows_are_recognised_by_their_pivots(stabilisation):
-    """The chain's rows are independent; the setting ``independent`` lets the solver use all rows without a
-    rank analysis."""
-    run = start_run(
-        find_scene("four_bar_chain[25]"), Method.parse(f"alf-dual+{stabilisation}"), np.array([0.1]), Limits()
-    )
-    rows = run.memory.pivots.size
-    assert rows > MOST_RANKED_ROWS, "singular values decide the rank of up to MOST_RANKED_ROWS rows"
-    assert run.memory.equations.system.settings.independent
-
-
-def test_redundant_rows_are_recognised_by_their_pivots():
-    """Bennett's linkage has three redundant rows: its pivots do not show all rows to be independent."""
-    run = start_run(find_scene("bennett"), Method.parse("alf-dual+projection"), np.array([0.1]), Limits())
-    blocks = run.model.terms(0.0, run.start.q).blocks
-    assert not are_clear(run.model, blocks, run.memory.factor)
