@@ -33,12 +33,9 @@ OPTIONS = ("-q", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRew
 KILLED, SURVIVED, UNREACHED, OUT_OF_TIME = "killed", "survived", "not run by any test", "out of time"
 LONGEST = 10.0  # CPU s of a test without mutants, beyond which it is left out
 WAITING = 5.0  # wall time / CPU time, after which a test waits for something that does not come
-SPARE, HANGS = (
-    20.0,
-    10.0,
-)  # CPU s, and CPU time / that without the mutant; beyond both a mutant loops for ever
+SPARE, HANGS = 20.0, 10.0  # CPU s, and CPU time / usual time, beyond both of which a mutant loops for ever
 ENDS = (pytest.ExitCode.OK, pytest.ExitCode.INTERRUPTED, pytest.ExitCode.NO_TESTS_COLLECTED)
-BATCHES = (10, 40, 160)  # first tests of a mutant, by how many pytest runs before it collects the next ones
+BATCHES = (10, 40, 160, 640)  # first tests of a mutant, whose files pytest collects together
 
 
 class Recorded(NamedTuple):
@@ -224,6 +221,7 @@ class _Failures:
         """Limit the CPU s of a test; none follows when the time has come."""
         _limit(SPARE + HANGS * self.usual[item.nodeid])
         done = yield
+        _limit(self.end)  # of all tests: collecting the next ones is no endless loop
         if _seconds() > self.end:
             item.session.shouldstop = "out of time"
         return done

@@ -234,7 +234,14 @@ def test_exact_accelerations_have_all_digits(records):
     assert np.isnan(paper_methods.digit_errors(other)["alf"][0])
 
 
-def test_every_figure_is_drawn(blocks):
-    drawn = [block.name for block in blocks if isinstance(block, Figure) and block.draw()]
+def test_every_figure_is_drawn_and_curves_over_time_run_forwards(blocks):
+    """All motions last 10 ms or more: violations on the axis of times would be smaller."""
+    drawn = {block.name: block.draw() for block in blocks if isinstance(block, Figure)}
     for number in (4, 5, 6, 8, 11, 12, 13, 14, 15, 16):
-        assert f"paper-figure-{number}" in drawn, f"Figure {number} is missing of {drawn}"
+        assert f"paper-figure-{number}" in drawn, f"Figure {number} is missing of {list(drawn)}"
+    panels = [axes for one in drawn.values() if not isinstance(one, str) for axes in one.axes]
+    over_time = [axes for axes in panels if axes.get_xlabel() == "t (s)"]
+    assert len(over_time) > 4, [axes.get_xlabel() for axes in panels]
+    for axes in over_time:
+        for x in (line.get_xdata() for line in axes.lines if len(line.get_xdata()) > 2):
+            assert x[-1] > 0.01 and (np.diff(x) > 0.0).all(), axes.get_ylabel()

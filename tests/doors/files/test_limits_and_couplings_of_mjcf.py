@@ -57,20 +57,23 @@ COUPLED = """<mujoco><compiler angle="radian"/><worldbody>
 <body name="a"><joint name="ja" axis="0 1 0" armature="0.2"/><geom size=".1" mass="1" pos=".3 0 0"/></body>
 <body name="b" pos="1 0 0"><joint name="jb" axis="0 1 0"/><geom size=".1" mass="2" pos=".3 0 0"/></body>
 <body name="c" pos="2 0 0"><joint name="jc" axis="0 1 0"/><geom size=".1" mass="1" pos=".3 0 0"/></body>
-<body name="d" pos="3 0 0"><joint name="jd" type="ball" armature="0.3"/>
+<body name="d" pos="3 0 0"><joint name="jd" type="ball" armature="0.3" stiffness="2" damping="0.5"/>
 <geom size=".1" mass="1" pos=".3 0 0"/></body>
 </worldbody><equality><joint name="line" joint1="jb" joint2="ja" polycoef="0 -3 0 0 0"/>
 <joint name="curve" joint1="jc" joint2="ja" polycoef="0 1 2 0 0"/></equality></mujoco>"""
 
 
-@pytest.mark.parametrize("kinds", ["couplings,armature", "everything"])
-def test_without_leaves_out_only_couplings_and_armature_that_a_scene_cannot_have(files, kinds):
-    """A scene has linear couplings and armatures of hinges: the quadratic one and a ball's are left out."""
+@pytest.mark.parametrize("kinds", ["couplings,armature,springs,damping", "everything"])
+def test_without_leaves_out_and_names_only_parts_that_a_scene_cannot_have(files, kinds):
+    """A scene has linear couplings and armatures of hinges: the quadratic one and parts of a ball joint are
+    left out."""
+    said = files.refusal(COUPLED, "a.xml", "--without", "couplings,armature")
+    assert "stiffness of joint 'jd'" in said and "damping of joint 'jd'" in said
     scene, out = files.scene(COUPLED, "a.xml", "--without", kinds)
     assert [(c.name, c.ratio) for c in scene.coupling] == [("line", -3.0)]
     assert {joint.name: joint.reflected_inertia for joint in scene.joint}["ja"] == 0.2
     left = [line for line in out.splitlines() if "--without" in line]
-    assert len(left) == 2 and "'curve'" in "".join(left) and "'jd'" in "".join(left)
+    assert len(left) == 4 and sum("'jd'" in line for line in left) == 3 and "'curve'" in "".join(left)
 
 
 def two_cranks(size: float, tilt: float = 0.0, rod: float = 1.1) -> str:
