@@ -203,8 +203,9 @@ def test_driver_acts_although_mujoco_renumbers_its_rows():
     assert violation_series(scene, run).max() < 1e-9
 
 
-def test_mujoco_library_is_found_in_its_package_or_among_loaded_ones(tmp_path, monkeypatch) -> None:
-    """A folder without it leads to the library that this process has loaded; without both it is refused."""
+def test_mujoco_s_library_is_found_in_its_package_or_among_loaded_ones(tmp_path, monkeypatch) -> None:
+    """Compiled families link MuJoCo's C library. A folder without it leads to the library that this process
+    has loaded; if there is none either, an error names the folder and the families."""
     own = Path(mujoco.__file__).parent
     beside = library(own)
     assert beside.parent == own and any(map(beside.match, LIBRARIES))

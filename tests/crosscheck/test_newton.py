@@ -60,6 +60,7 @@ def error_of_four_bar(family: str, step: float = STEP) -> float:
 
 
 def test_newton_refuses_drivers_and_the_adapter_refuses_torsion_springs():
+    """Each refusal names its owner and the part of the scene; a scene without them is not refused."""
     newton = engine("newton")
     driven = newton.cannot(SCENES["four_bar"]())
     assert driven.owner is Owner.ENGINE and "joint 'A'" in driven.reason, driven
@@ -180,4 +181,5 @@ def test_first_step_of_newton_has_the_reference_s_accelerations(family, make):
 
 
 def test_every_solver_of_newton_has_a_measured_error():
+    """Except for Featherstone's, which leaves the loop open."""
     assert set(ERRORS) | {"featherstone"} == set(FAMILIES)

@@ -113,6 +113,7 @@ def test_engine_moves_a_coupling_with_offset_as_the_reference(name):
 
 
 def test_engines_refuse_a_scene_that_is_not_assembled():
+    """The coupling's offset does not hold in the file's poses; the reason names it and the remedy."""
     refusal = engine("mujoco").cannot(shifted(gear_pair, "teeth", 0.4))
     assert refusal is not None
     assert refusal.reason == (

@@ -41,6 +41,7 @@ def is_installed(module: str) -> bool:
 
 @pytest.mark.parametrize("name", MODULES)
 def test_mujoco_s_ports_refuse_drivers(name: str) -> None:
+    """They lack MuJoCo's callback, by which its adapter drives; the four-bar without a driver is accepted."""
     refusal = engine(name).cannot(SCENES["four_bar"]())
     assert refusal is not None and refusal.owner is Owner.ENGINE and "callback" in refusal.reason, refusal
     assert engine(name).cannot(SCENES["four_bar_gravity"]()) is None

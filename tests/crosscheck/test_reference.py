@@ -142,8 +142,8 @@ def test_panels_of_a_stiff_governor_are_as_long_as_its_smooth_motion_allows():
 
 
 def test_seed_of_the_rows_moves_contradicting_joints_by_rounding_only():
-    """Bennett's linkage with rounded axes, in formulation B: another seed selects other rows, and the motion
-    differs by at most 1e-14; with an equal seed it is the same to the last bit."""
+    """Bennett's linkage with rounded axes, in formulation B: another seed selects other rows and displaces
+    joints by 2e-16, and the motion differs by at most 1e-14; an equal seed gives it to the last bit."""
     scene = Isometry(ASKEW, np.array([0.3, -0.5, 0.2])).change(SCENES["bennett"]())
     one, same, other = (
         tree_motion(scene, [0.5], EXTENDED, seconds=SECONDS, seed=seed, displaced=displaced)
@@ -419,7 +419,8 @@ def test_damaged_cache_file_of_a_reference_is_made_again(own_cache, damage):
 
 
 def test_reference_needs_no_cache_that_can_be_written(tmp_path, monkeypatch):
-    """A file stands where the folder of the cache should be: the reference is given, with its bound."""
+    """A file stands where the folder of the cache should be; the reference is the closed form of a free
+    fall."""
     (tmp_path / "mbref").write_text("no folder")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     scene, exact = free_fall()

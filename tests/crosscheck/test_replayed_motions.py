@@ -72,14 +72,6 @@ def test_constant_driving_moment_replaces_the_driver(size):
     assert [body.angular_velocity for body in found.body] == [(0.0, 0.0, 0.5), (0.0, 0.0, 0.0)]
 
 
-def test_replayed_scene_starts_with_the_angular_velocities_of_the_first_sample():
-    """The run's samples have different ones."""
-    spin = np.arange(12.0).reshape(2, 2, 3)
-    run = motion(angular_velocity=spin, reactions={"crank": np.ones((2, 6))})
-    found = replays.replayed(scene(joint=(SHAFT, CRANK), driver=(DRIVER,)), run)
-    assert [body.angular_velocity for body in found.body] == [(0.0, 1.0, 2.0), (3.0, 4.0, 5.0)]
-
-
 @pytest.mark.parametrize("size", [4.0, -4.0])
 def test_driving_moment_that_varies_by_over_1e_6_is_refused(size):
     """Moments at two samples differ by 1.1e-6 of themselves."""

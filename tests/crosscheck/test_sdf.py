@@ -123,7 +123,8 @@ def assert_is_the_same_mechanism(scene, found) -> None:
 
 @pytest.mark.parametrize("name", LOOPS)
 def test_loop_returns_from_sdf_in_random_frames(name, tmp_path):
-    """The scene is written with random frames of models, links, joints and inertias, and read again."""
+    """Written with random frames of models, links, joints and inertias, and read again, the scene has the
+    same joints, rank, places and accelerations."""
     scene = at_rest(SCENES[name]())
     for found in returned(scene, np.random.default_rng(len(name)), tmp_path):
         assert_is_the_same_mechanism(scene, found)
@@ -144,8 +145,8 @@ def random_scene(seed: int):
     "seeds", [range(5), pytest.param(range(5, 105), marks=pytest.mark.slow)], ids=["few", "many"]
 )
 def test_random_mechanisms_return_from_sdf_in_random_frames(seeds, tmp_path):
-    """Random mechanisms, most of them with three joints or more, are written in random frames and read
-    again."""
+    """Read again, random mechanisms, most of them with three joints or more, have the same joints, rank,
+    places and accelerations."""
     scenes = [random_scene(seed) for seed in seeds]
     assert sum(len(scene.joint) > 2 for scene in scenes) > len(scenes) / 2
     for seed, scene in zip(seeds, scenes, strict=True):

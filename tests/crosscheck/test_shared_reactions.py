@@ -49,16 +49,6 @@ def test_unit_multiplier_of_a_coupling_acts_along_both_coordinates():
     assert np.linalg.matrix_rank(own) == 5 and not own[5].any(), "no moment about the axis"
 
 
-@pytest.mark.parametrize(("bodies", "sign"), [(("ground", "a"), 1.0), (("a", "ground"), -1.0)])
-def test_multiplier_s_wrench_acts_on_the_second_body_at_its_anchor(bodies, sign):
-    """A unit multiplier of the row v_y + 5 ω_z of body a, whose centre is at x = 3 m: at the anchor, at 2 m,
-    a force of 1 N along y and a moment of 5 + 1 N m; on the ground, if that is second, the opposite."""
-    scene = Scene(name="s", body=(body("a", 3.0),), joint=(hinge("A", *bodies, x=2.0),))
-    rows = np.array([[0.0, 1.0, 0.0, 0.0, 0.0, 5.0]])
-    found = joint_reactions.on_second(scene, scene.joint[0], rows, *initial_poses(scene))
-    assert found[:, 0] == pytest.approx(sign * np.array([0, 1, 0, 0, 0, 6.0]))
-
-
 def run(**forces: tuple[float, ...]) -> Trajectory:
     """Both bodies at rest at three times; joints with the given wrenches."""
     place, turn = np.stack([POSE[0]] * 3), np.stack([POSE[1]] * 3)

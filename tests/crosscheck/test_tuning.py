@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentTypeError
 from dataclasses import asdict
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -24,25 +24,34 @@ FOUND_TO = 1.15  # factor to which the search finds the longest step that is acc
 SCENE = Scene(name="block", body=(BLOCK,), duration=1.0)
 
 
-class Modelled:
-    """A model of runs: a family is (order p, factor C, cost c, longest step h₁). A run with step h has the
-    error C hᵖ, c / h seconds and 1 / h right-hand sides, and fails above h₁; ``asked`` lists family and
-    step."""
+class Family(NamedTuple):
+    """A run with step h has the error factor · h^order, takes cost / h seconds, and fails above
+    ``longest``."""
 
-    def __init__(self, **families: tuple[float, float, float, float]) -> None:
+    order: float
+    factor: float = 1.0
+    cost: float = 1e-3
+    longest: float = 1.0
+
+
+class Modelled:
+    """A model of an engine's runs, with 1 / h right-hand sides; ``asked`` lists family and step of each
+    run."""
+
+    def __init__(self, **families: Family) -> None:
         self.families, self.asked = families, []
 
     def __call__(self, cases: list[Case]) -> list[dict[str, Any]]:
         return [self.record(case) for case in cases]
 
     def record(self, case: Case) -> dict[str, Any]:
-        order, factor, cost, breaks = self.families[case.setting.family]
+        order, factor, cost, longest = self.families[case.setting.family]
         h = case.setting.options["step"]
         self.asked.append((case.setting.family, h))
         return {
             "key": key(case),
             "family": case.setting.family,
-            "outcome": "COMPLETED" if h <= breaks else "NOT_FINITE",
+            "outcome": "COMPLETED" if h <= longest else "NOT_FINITE",
             "t_end": 1.0,
             "metrics": {"error": factor * h**order, "error_bound": 1e-14},
             "cost": {"seconds": cost / h, "rhs": 1 / h},
@@ -68,14 +77,14 @@ def test_cheapest_step_is_found_inside_and_beyond_the_grid_of_steps(level):
     finer, the other has coarser and finer ones."""
     best = level**0.25
     for steps in ((0.01, 0.003, 0.001), (0.9, 0.3, 0.1, 0.03, 0.01)):
-        step = found(Modelled(rk4=(4.0, 1.0, 1e-3, 1.0)), level, *steps)["rk4"]
+        step = found(Modelled(rk4=Family(order=4.0)), level, *steps)["rk4"]
         assert best / FOUND_TO < step <= best, (level, steps, step, best)
 
 
 def test_cheapest_setting_is_no_more_accurate_than_needed():
     """The error h⁴ is to be below 1e-3. The setting found has the least work of all runs within it, its error
     exceeds 1e-4, and the finest step of the grid, 0.001, is not run."""
-    engine = Modelled(rk4=(4.0, 1.0, 1e-3, 1.0))
+    engine = Modelled(rk4=Family(order=4.0))
     done = tuned(engine.cases(0.1, 0.01, 0.001), 1e-3, engine)
     [cheapest] = done.reached
     assert cheapest["metrics"]["error"] > 1e-4, cheapest
@@ -87,14 +96,14 @@ def test_cheapest_setting_is_no_more_accurate_than_needed():
 
 def test_cheapest_step_is_below_the_one_at_which_runs_fail():
     """Any step that runs is accurate: the answer is the largest that runs, 0.05."""
-    step = found(Modelled(soft=(1.0, 1e-9, 1e-3, 0.05)), 1e-3, 0.004, 0.002)["soft"]
+    step = found(Modelled(soft=Family(order=1.0, factor=1e-9, longest=0.05)), 1e-3, 0.004, 0.002)["soft"]
     assert 0.05 / FOUND_TO < step <= 0.05, step
 
 
 def test_no_coarser_step_is_tried_that_costs_as_much():
     """Steps longer than 0.1 cost as much as 0.1, as where samples bound the step: after the grid's two
     settings no coarser one is tried, and the answer has the work of 0.1, 10 right-hand sides."""
-    engine = Modelled(f=(4.0, 1e-12, 1e-3, 1.0))
+    engine = Modelled(f=Family(order=4.0, factor=1e-12))
     engine.record = lambda case, record=engine.record: _bounded(record(case))  # type: ignore[method-assign]
     done = tuned(engine.cases(0.1, 0.05), 1e-3, engine)
     assert len(done.records) == 2 and work(done.reached[0]) == 10, done.records
@@ -107,7 +116,7 @@ def _bounded(record: dict[str, Any]) -> dict[str, Any]:
 
 def test_family_more_expensive_than_the_cheapest_is_abandoned():
     """After its coarsest run, of 10 s, which the cheap family undercuts, it is not run at finer steps."""
-    engine = Modelled(cheap=(4.0, 1.0, 1e-3, 1.0), expensive=(1.0, 1.0, 1.0, 1.0))
+    engine = Modelled(cheap=Family(order=4.0), expensive=Family(order=1.0, cost=1.0))
     assert list(found(engine, 1e-6, 0.1, 0.01, 0.001)) == ["cheap"]
     assert [h for family, h in engine.asked if family == "expensive"] == [0.1], engine.asked
 
@@ -116,7 +125,9 @@ def test_family_more_expensive_than_the_cheapest_is_abandoned():
 def test_inaccurate_family_is_abandoned_once_its_run_costs_twice_the_cheapest(seconds, steps):
     """At h = 0.1 "cheap" has the error h² = 0.01, as wanted, and runs for 0.1 s; "other" has an error of 4 h²
     and needs h = 0.05, which is tried only if its run at h = 0.1 took less than 0.2 s."""
-    engine = Modelled(cheap=(2.0, 1.0, 0.01, 1.0), other=(2.0, 4.0, 0.1 * seconds, 1.0))
+    engine = Modelled(
+        cheap=Family(order=2.0, cost=0.01), other=Family(order=2.0, factor=4.0, cost=0.1 * seconds)
+    )
     found(engine, 1.001e-2, 0.1, 0.05)
     assert [h for family, h in engine.asked if family == "other"][:2] == steps, engine.asked
 
@@ -124,7 +135,9 @@ def test_inaccurate_family_is_abandoned_once_its_run_costs_twice_the_cheapest(se
 def test_cheap_integrator_of_crosscheck_does_not_end_the_search_of_engine_families():
     """Family "ours" costs 1e-6 of "own"; both are tuned. "slower" costs more than "own" and is abandoned. The
     error h² of "own" reaches 1e-4 at h = 1e-2."""
-    engine = Modelled(ours=(8.0, 1.0, 1e-6, 1.0), own=(2.0, 1.0, 1.0, 1.0), slower=(1.0, 1.0, 1.0, 1.0))
+    engine = Modelled(
+        ours=Family(order=8.0, cost=1e-6), own=Family(order=2.0, cost=1.0), slower=Family(order=1.0, cost=1.0)
+    )
     both = found(engine, 1e-4, 0.1, 0.01, 0.001, 0.0001, ours=("ours",))
     assert list(both) == ["ours", "own"], both
     assert 1e-2 / FOUND_TO < both["own"] <= 1e-2
@@ -132,15 +145,16 @@ def test_cheap_integrator_of_crosscheck_does_not_end_the_search_of_engine_famili
 
 def test_family_that_timed_out_is_abandoned():
     """The first run times out, and no other run is made."""
-    engine = Modelled(slow=(4.0, 1.0, 1.0, 1.0))
+    engine = Modelled(slow=Family(order=4.0, cost=1.0))
     engine.record = lambda case, record=engine.record: {**record(case), "outcome": "TIMED_OUT"}  # type: ignore
     assert not found(engine, 1e-9, 0.1, 0.01) and len(engine.asked) == 1, engine.asked
 
 
 def test_no_setting_reaches_an_error_below_the_truth_s_bound():
-    """Level 1e-10; the truth is known to 2e-9 (no setting) or to 1e-11 (one setting)."""
+    """A truth known to 2e-9 cannot show an error below 1e-10, so that no setting is found; one known to 1e-11
+    can. Runs have errors of 1e-15."""
     for bound, count in ((2e-9, 0), (1e-11, 1)):
-        engine = Modelled(f=(4.0, 1e-3, 1e-3, 1.0))
+        engine = Modelled(f=Family(order=4.0, factor=1e-3))
         engine.record = lambda case, record=engine.record, bound=bound: _rough(record(case), bound)  # type: ignore
         assert len(tuned(engine.cases(0.001, 0.0005), 1e-10, engine).reached) == count
 
@@ -203,7 +217,7 @@ def test_settings_of_steps_longer_than_the_samples_allow_are_not_chosen():
             error = 0.0 if 0.45 < asked < 0.55 else min(asked, 0.1) ** 2
             return {**record, "metrics": {**record["metrics"], "error": error}}
 
-    engine = Stabilised(f=(2.0, 1.0, 1e-3, 1.0))
+    engine = Stabilised(f=Family(order=2.0))
     times = np.linspace(0.0, 1.0, 11)
     done = tuned([case._replace(times=times) for case in engine.cases(0.5, 0.05, 0.01)], 1e-3, engine)
     [cheapest] = done.cases
@@ -216,7 +230,7 @@ def test_cheapest_step_by_closure_gap_counts_distances_and_no_angles():
     scene = SCENE.with_(
         joint=[{"name": "A", "type": "fixed", "bodies": ["ground", "b"], "anchor": [2.0, 0.0, 0.0]}]
     )
-    engine, tilt = Modelled(rk2=(2.0, 1.0, 1e-3, 1.0)), rotations.from_vector(np.array([0.5, 0.0, 0.0]))
+    engine, tilt = Modelled(rk2=Family(order=2.0)), rotations.from_vector(np.array([0.5, 0.0, 0.0]))
 
     def run(cases):
         found = []

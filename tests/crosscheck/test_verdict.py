@@ -210,7 +210,8 @@ def test_errors_below_the_truth_s_bound_are_drawn_at_the_bound():
 
 
 def test_tables_of_eighty_columns_cut_no_number():
-    """Each number is in the tables of comparison and of runs; a run that ends at t = -1e-8 s has none."""
+    """Each number stands whole in the tables of comparison and of runs. An end time of -1e-8 s is rounding,
+    and printed in neither; nor is a time of zero for a run that failed at its start."""
     measured = {
         "error": 2.71e-5,
         "error_bound": 1e-14,
