@@ -178,6 +178,7 @@ def test_every_fault_of_a_scene_file_is_reported_with_its_line(capsys, tmp_path)
 
 
 def test_a_velocity_that_contradicts_a_joint_is_reported_once_with_the_joints_line(capsys, tmp_path):
+    """The body moves along x at 5 m/s, away from its hinge; the joint's table begins in line 8."""
     path = tmp_path / "bad.toml"
     path.write_text(
         'name = "bad"\n[[body]]\nname = "a"\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]\n'

@@ -43,7 +43,7 @@ def test_exact_motions_of_a_scene_pass_the_comparison_with_and_without_accelerat
 def test_missing_gravity_is_reported_as_a_difference_of_the_change_of_velocity():
     scene = MODELS["four_bar_gravity"]
     found = gate(scene, [short_run(scene), short_run(scene.with_(gravity=(0, 0, 0)), gate_times(scene))])
-    assert found.field == "change of velocity" and "change of velocity: truth and truth" in str(found), found
+    assert found.field == "change of velocity", found
 
 
 def test_a_run_with_missing_samples_is_reported():
