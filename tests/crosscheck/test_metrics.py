@@ -122,6 +122,7 @@ def test_metrics_do_not_depend_on_the_order_of_bodies():
 
 
 def test_run_of_a_body_that_the_scene_lacks_is_refused():
+    """The run has a body "other" in place of the slider; the error names it."""
     with pytest.raises(ValueError, match="'other'"):
         measure(SCENE, replace(EXACT, bodies=("crank", "rod", "other")), TRUTH)
 
@@ -165,6 +166,7 @@ def test_cost_at_an_error_is_read_on_the_lower_envelope_of_the_runs(level, cost)
 
 
 def test_runs_without_a_finite_error_have_no_cost_at_an_error():
+    """None stands for no cost; with finite errors there is one (test above)."""
     assert cost_at_error([1.0, 2.0], [math.nan, math.inf], 1.0) is None
 
 

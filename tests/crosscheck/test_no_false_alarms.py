@@ -53,7 +53,7 @@ def on_a_turntable() -> Scene:
 
 
 RIGHT = "All 3 engines are right at their best settings"
-FOUND = {
+FOUND = {  # words that the page has
     hanging: RIGHT,
     held_boom: RIGHT,
     falling: RIGHT,

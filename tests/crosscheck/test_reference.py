@@ -206,7 +206,7 @@ def test_twenty_digits_are_certified_by_both_formulations():
     table = certified(scene, np.array([0.0, 0.3]), 20)
     assert float(table["bound"]) <= 1e-20 and table["hash"] == digest(table)
     place = np.array(table["position"][1][0], dtype=float)
-    assert np.abs(place - exact(np.array([0.3]))[0][0, 0]).max() < 1e-15
+    assert np.abs(place - exact(np.array([0.3]))[0][0, 0]).max() < AGREE
     assert len(table["position"][1][0][0].strip("-")) >= 22
 
 
@@ -221,7 +221,7 @@ def test_thirty_digits_and_extended_precision_move_alike(make, times):
     motion = natural_motion(scene, times, many_digits(30), order=30, tolerance=1e-20, seconds=SECONDS)
     assert not motion.reason
     other = natural_motion(scene, times, EXTENDED, seconds=SECONDS)
-    assert np.abs(doubles(motion.position) - doubles(other.position)).max() < 1e-15
+    assert np.abs(doubles(motion.position) - doubles(other.position)).max() < AGREE
 
 
 def test_redundant_joints_are_moved_in_ball_arithmetic():

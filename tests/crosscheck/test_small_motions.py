@@ -96,7 +96,8 @@ def test_four_bar_with_diagonal_spring_has_its_closed_form_eigenvalues():
 
 
 def test_ball_on_a_turning_spindle_has_the_roots_of_euler_s_equations():
-    """s = ± i Ω and s² = -Ω² (C - A) (C - B) / (A B), seen from the spindle, and a double zero of turning."""
+    """A body on a ball joint with moments A, B, C turns with a spindle at Ω about its axis of C: seen from
+    the spindle, s = ± i Ω and s² = -Ω² (C - A) (C - B) / (A B), to rounding."""
     rate, (a, b, c) = 6.0, (0.02, 0.03, 0.045)
     bodies = [
         {"name": "spindle", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.0, 0.0, 1.0]},
@@ -112,7 +113,8 @@ def test_ball_on_a_turning_spindle_has_the_roots_of_euler_s_equations():
 
 
 def test_steady_pose_of_the_governor_stays_steady_when_integrated():
-    """Over 0.2 s of the judge's integration a ball's distance from the axis and the sleeve's height stay."""
+    """Over 0.2 s of the judge's integration by Gauss's principle a ball's distance from the axis and the
+    sleeve's height stay, within 1e-8, the tolerance of the integration."""
     [each] = [e for e in steady_poses(governor(), starts=1) if e.stability == "stable"]
     scene = at_pose(each.balance, each.state)
     moved = gauss_motion(scene, (0.0, 0.2))
@@ -152,7 +154,8 @@ def test_mujoco_s_own_linearisation_has_the_judge_s_eigenvalues():
 
 
 def test_exudyn_s_own_linearisation_leaves_out_how_constraint_forces_turn():
-    """Slides, whose forces do not turn, have the judge's eigenvalues; those of a pendulum are zero."""
+    """Slides, whose constraint forces do not turn, have the judge's eigenvalues; a pendulum's, which follow
+    from the turning of its hinge's force alone, are zero. Both to 1e-6, by finite differences."""
     pytest.importorskip("exudyn")
     [below] = [each for each in steady_poses(pendulum(), starts=4) if each.stability == "stable"]
     [slides] = steady_poses(damped_slides(), starts=1)
@@ -188,7 +191,8 @@ def test_poses_of_a_slider_crank_close_its_joints_and_hang_or_stand():
 
 
 def test_differences_of_mujoco_s_accelerations_include_dampers():
-    """The judge's eigenvalues of two damped slides are the truth."""
+    """The judge's eigenvalues of two damped slides are the truth; differences of accelerations give them to
+    1e-9 of the largest."""
     [slides] = steady_poses(damped_slides(), starts=1)
     found = by_accelerations(engine("mujoco"), slides)
     assert found.eigenvalues is not None and error(found.eigenvalues, slides.eigenvalues) < 1e-9
