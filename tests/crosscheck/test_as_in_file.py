@@ -260,12 +260,6 @@ def test_reading_a_file_reports_parts_left_out_and_closed_loops(tmp_path):
     assert any("closure 'C' was open by" in sentence for sentence in said)
 
 
-def test_a_file_with_dry_friction_is_refused_with_the_option_that_leaves_it_out(tmp_path):
-    text = FOUR_BAR.replace('damping="0.01"', 'frictionloss="0.1"')
-    with pytest.raises(RequestError, match="dry friction of 'D': it changes the motion; --without friction"):
-        imported(tmp_path, text)
-
-
 def test_a_missing_file_is_refused_by_its_name(tmp_path):
     with pytest.raises(RequestError, match=r"none\.xml"):
         find_scenes([str(tmp_path / "none.xml")])

@@ -461,8 +461,3 @@ def test_compare_tries_every_family_before_it_says_that_an_engine_completes_no_r
     asked = ("--engine", f"{FAKES}:LAST_ONE_RUNS", "--setting", "first")
     status, out, _ = run_main(capsys, "compare", still, *asked)
     assert "last completes no run" in " ".join(out.split()) and "fourth" not in out, out
-
-
-def test_compare_refuses_fewer_than_five_repeats(capsys, still):
-    status, _, err = run_main(capsys, "compare", still, "--engine", FAKE, "--repeats", "2")
-    assert status == 2 and "--repeats: must be a whole number from 5 to 1000, got 2" in err, err

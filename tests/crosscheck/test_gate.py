@@ -67,13 +67,8 @@ def test_a_rotated_body_is_reported_with_its_angle():
 
 ARM = Body(name="arm", mass=2.0, inertia=(1e-3, 0.1, 0.1), position=(0.5, 0.0, 0.0))
 HINGE = Revolute(name="A", bodies=("ground", "arm"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
-HOLDING = Spring(
-    bodies=("ground", "arm"),
-    points=((1.0, 1.0, 0.0), (1.0, 0.0, 0.0)),
-    stiffness=9.81,
-    damping=0.0,
-    natural_length=0.0,
-)
+ENDS = ((1.0, 1.0, 0.0), (1.0, 0.0, 0.0))  # m, of a spring without length when it is not loaded
+HOLDING = Spring(bodies=("ground", "arm"), points=ENDS, stiffness=9.81, damping=0.0, natural_length=0.0)
 
 
 def arm(**parts):
@@ -134,11 +129,8 @@ def test_accelerations_along_a_run_may_be_off_by_one_percent(part, passes):
     passes."""
     scene = arm()
     run = gauss_motion(scene, (0.0, 0.1))
-    off = replace(
-        run,
-        acceleration=(1 + part) * run.acceleration,
-        angular_acceleration=(1 + part) * run.angular_acceleration,
-    )
+    names = ("acceleration", "angular_acceleration")
+    off = replace(run, **{name: (1 + part) * getattr(run, name) for name in names})
     assert (along(scene, off) is None) is passes, along(scene, off)
     assert along(scene, replace(off, acceleration=None)) is None
 

@@ -269,11 +269,6 @@ def untimed(run: Trajectory) -> str:
     return repr({**record, "cost": {k: v for k, v in record["cost"].items() if "seconds" not in k}})
 
 
-def test_an_unknown_engine_is_refused_with_the_known_ones():
-    with pytest.raises(LookupError, match="unknown engine 'nosuch'; known: mbref"):
-        run_isolated("nosuch", still(), TIMES, PLAIN, 1.0)
-
-
 @pytest.mark.parametrize("sent", ["SIGINT", "SIGTERM", "SIGKILL"])
 def test_a_signal_to_the_parent_ends_a_child_that_hangs_and_its_children(sent: str, tmp_path: Path):
     """The engine HANG and a process that it starts sleep for 600 s."""
