@@ -1,7 +1,5 @@
 """Compile the kernels that the tests need, before them: python -m tests.kernels"""
 
-from __future__ import annotations
-
 from crosscheck.engines.shared.compiled import run as integrators
 from mbref.kernels.compilation import prepare_all
 from mbref.method import Method

@@ -5,8 +5,6 @@ its engine, and the worker processes of an ensemble, each so many times, and pri
 status 1 where a record is lost, written twice, or where more runs are lost than processes were killed.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import multiprocessing

@@ -6,8 +6,6 @@ alone, and ``--ignore-glob`` is pytest's.  ``--motions`` compares the built-in s
 those of the first setting. Exit status 1 where a test fails, or where motions differ by more than MOST_APART.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

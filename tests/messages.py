@@ -3,8 +3,6 @@
 A message is a text of at least four words that is no docstring, and no part of another text.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

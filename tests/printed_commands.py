@@ -1,7 +1,5 @@
 """Commands that README and docs print, read from their shell blocks."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Iterator, Sequence

@@ -3,8 +3,6 @@
 python -m tests.prose [FILE ...]
 """
 
-from __future__ import annotations
-
 import re
 import sys
 import tomllib

@@ -1,7 +1,5 @@
 """Commands and Python that README and docs print run as a reader would run them."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys
@@ -66,9 +64,9 @@ OTHERS = [
 
 
 @pytest.mark.parametrize("page", ["README.md", *map(slow, OTHERS)])
-def test_printed_commands_of_mbref_run(page, tmp_path):
-    """In the order of the page, in one folder that has my.toml: exit status 0 (test_transcripts.py compares
-    outputs)."""
+def test_printed_commands_of_mbref_end_with_status_0(page, tmp_path):
+    """They run in the order of the page, in one folder that has my.toml; test_transcripts.py compares
+    outputs."""
     if page in OWN:
         SCENES[OWN[page]]().save(tmp_path / "my.toml")
     elif page != "README.md":
@@ -80,14 +78,17 @@ def test_printed_commands_of_mbref_run(page, tmp_path):
 
 @pytest.mark.parametrize("page", ["README.md", slow("docs/api.md"), slow("docs/judge.md")])
 def test_printed_python_runs_without_error(page, tmp_path, monkeypatch):
+    """Each block of the page alone, as a reader would paste it."""
     monkeypatch.chdir(tmp_path)
-    for block in re.findall(r"^```python\n(.*?)^```$", (ROOT / page).read_text(), re.S | re.M):
+    blocks = re.findall(r"^```python\n(.*?)^```$", (ROOT / page).read_text(), re.S | re.M)
+    assert blocks
+    for block in blocks:
         exec(block, {})
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("words", OF_CROSSCHECK.values(), ids=OF_CROSSCHECK)
-def test_printed_commands_of_crosscheck_run(words, tmp_path):
+def test_printed_command_of_crosscheck_ends_with_status_0(words, tmp_path):
     """Each in a folder of its own that has my.toml, robot.xml and the scene files that the command names."""
     if words[1] == "certify":
         pytest.importorskip("flint")

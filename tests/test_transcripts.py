@@ -1,7 +1,5 @@
 """Outputs shown in README and docs: each command still prints what stands under it, except for numbers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -20,8 +18,7 @@ def is_costly(page: Path) -> bool:
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=[pytest.mark.slow] * is_costly(page)) for n, page in SHOWING.items()],
+    "name", [pytest.param(n, marks=[pytest.mark.slow] * is_costly(page)) for n, page in SHOWING.items()]
 )
 def test_commands_print_what_pages_show(name):
     """Words are compared; numbers and borders of tables may differ between machines."""
@@ -31,6 +28,7 @@ def test_commands_print_what_pages_show(name):
 
 
 def test_every_command_of_a_page_has_its_output():
+    """A block of console text begins with a command, and no command follows another one directly."""
     for name, page in SHOWING.items():
         for block in BLOCK.findall(page.read_text()):
             lines = block.splitlines()
@@ -39,6 +37,7 @@ def test_every_command_of_a_page_has_its_output():
 
 
 def test_output_of_each_command_is_filled_in_under_it():
+    """`filled` runs the commands of a page by a shell; text outside the block stays."""
     text = "Before.\n\n```console\n$ echo 0.25 m\n$ echo two\n```\n\nBehind.\n"
     assert filled(text) == text.replace("$ echo two", "0.25 m\n$ echo two\ntwo")
 
@@ -48,7 +47,7 @@ def test_command_that_prints_nothing_is_an_error():
         filled("```console\n$ exit 3\n```\n")
 
 
-def test_comparison_of_outputs_ignores_numbers_and_sees_words():
+def test_comparison_of_outputs_ignores_numbers_and_sees_units():
     assert shape("0.25 m") == shape("< 1e-13 m") != shape("0.25 mm")
 
 

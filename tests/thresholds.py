@@ -3,8 +3,6 @@
 ``python -m tests.thresholds docs/results/thresholds.md`` writes the page.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

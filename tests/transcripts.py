@@ -4,8 +4,6 @@ Commands stand in blocks named ``console``. Python with an output is followed by
 ``python -m tests.transcripts PAGE …`` runs both and writes their outputs into the pages.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

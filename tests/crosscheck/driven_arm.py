@@ -1,7 +1,5 @@
 """A mechanism that two drivers move, and the settings with which every engine runs it."""
 
-from __future__ import annotations
-
 import math
 import sys
 from typing import Any, NamedTuple

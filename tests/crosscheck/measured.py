@@ -3,8 +3,6 @@
 A test states the measured errors; whoever makes them smaller writes the new ones down.
 """
 
-from __future__ import annotations
-
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory

@@ -1,7 +1,5 @@
 """Imported scenes / the original models, whose matrices by MuJoCo are integrated finely."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 from scipy.integrate import solve_ivp

@@ -1,7 +1,5 @@
 """Random MJCF and URDF files: trees of idioms of joints, loops open at the reference, other parts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import mujoco

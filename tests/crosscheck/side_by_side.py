@@ -1,7 +1,5 @@
 """Several scenes in one, so that an engine compiles its code once for all."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

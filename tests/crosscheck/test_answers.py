@@ -1,7 +1,5 @@
 """Malformed answers of engines are refused with their defect, and a study goes on after them."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

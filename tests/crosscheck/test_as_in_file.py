@@ -1,7 +1,5 @@
 """MJCF files as scenes of crosscheck: MuJoCo's run of the file's own model, and bodies held by ``--hold``."""
 
-from __future__ import annotations
-
 import math
 
 import mujoco

@@ -1,7 +1,5 @@
 """Engines of the benchmarks, with equations derived by hand and SciPy's integrators, against the truth."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Child process: values, printed text and files of its calls, limits, and failures that end it."""
 
-from __future__ import annotations
-
 import operator
 import os
 import subprocess

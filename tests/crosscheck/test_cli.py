@@ -1,7 +1,5 @@
 """Command line of crosscheck: exit status, standard output and standard error of every command."""
 
-from __future__ import annotations
-
 import io
 import json
 import shlex

@@ -4,8 +4,6 @@ A clock that advances by 1 s at each reading replaces the CPU clock. It is read 
 building: 1 s. It is read at the start and end of stepping to each of three samples, 3 s, or to all, 1 s.
 """
 
-from __future__ import annotations
-
 import itertools
 import time
 

@@ -1,7 +1,5 @@
 """Closed forms of the judge against formulas, and scenes that have no closed form."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

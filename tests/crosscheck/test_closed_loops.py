@@ -1,7 +1,5 @@
 """The table of closed loops: its mechanisms, the cells of records, and the committed page."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

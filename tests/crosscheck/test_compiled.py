@@ -1,7 +1,5 @@
 """The compiled DOP853 against closed forms, and engines' compiled families against truths and Python runs."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable, Iterable
 from typing import Any

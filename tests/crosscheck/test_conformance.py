@@ -1,7 +1,5 @@
 """Conformance suite: its exact motions against the judge, and its verdicts on engines with known faults."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

@@ -4,8 +4,6 @@ The three sets share no code, and their rows differ. At states that meet the con
 spaces, ranks and least-norm accelerations.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

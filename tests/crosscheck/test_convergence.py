@@ -1,7 +1,5 @@
 """Orders of convergence of made-up errors with a known order and floor, and the committed page."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import pytest

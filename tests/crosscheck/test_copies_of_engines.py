@@ -4,8 +4,6 @@ and the loop cut at each of its joints.
 Single and double precision of MJX and MuJoCo Warp are compared in test_ports.py.
 """
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

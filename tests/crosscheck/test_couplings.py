@@ -1,7 +1,5 @@
 """Couplings and armatures: engines and mbref move as the judge's reference, or refuse them by name."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

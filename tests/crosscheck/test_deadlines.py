@@ -1,7 +1,5 @@
 """Limits of CPU time end the judge's searches for references and certified tables."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

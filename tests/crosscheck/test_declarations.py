@@ -1,7 +1,5 @@
 """Adapters refuse joints, drivers and loads that they do not declare; facts of joints match all equations."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

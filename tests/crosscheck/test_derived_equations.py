@@ -1,7 +1,5 @@
 """Symbolic equations of motion of adapters, and their forces on bodies, against textbook equations."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Differences of two sets of records: sentences on numbers just below and just above the limits of noise."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Every family of each adapter follows two drivers with phases, whose motion is known in closed form."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

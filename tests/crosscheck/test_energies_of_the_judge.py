@@ -1,7 +1,5 @@
 """Energies and works of one body in given states, against the numbers of their formulas (J)."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The judge's residuals, rates, loads and terms against formulas and differences."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

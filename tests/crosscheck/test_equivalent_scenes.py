@@ -1,7 +1,5 @@
 """Equivalent forms of a scene: other names, negative quaternions, a body split in halves."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Errors that an engine estimates itself: in records of a study, within a limit of time, or not at all."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Gauss's principle, integrated, gives the motion of closed forms; exact motions conserve momenta."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The engine of the examples as an installed plug-in: it is listed, right, and passes the suite."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path

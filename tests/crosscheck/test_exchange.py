@@ -1,7 +1,5 @@
 """MJCF and URDF: scenes accelerate as MuJoCo's matrices of the file say, and survive a round trip."""
 
-from __future__ import annotations
-
 import dataclasses
 from importlib.metadata import EntryPoint
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Names that crosscheck exports, the cost of its import, and the module that a third party's engine needs."""
 
-from __future__ import annotations
-
 import ast
 import subprocess
 import sys

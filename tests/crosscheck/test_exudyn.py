@@ -1,7 +1,5 @@
 """Exudyn's runs against truths and closed forms, and its failures at singular positions."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

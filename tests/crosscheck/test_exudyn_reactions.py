@@ -1,7 +1,5 @@
 """Exudyn's reactions satisfy the equations of Newton and Euler of the body that the joint holds."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Exudyn's extrapolated runs through singular positions against truths, and their projection onto joints."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Findings in other libraries: their page, their proofs, and their status at the installed version."""
 
-from __future__ import annotations
-
 import math
 import re
 

@@ -4,8 +4,6 @@ At t = 0, Gauss's principle gives the accelerations, and a balance of each body 
 every joint, load and driver. A joint whose bodies are exchanged has the opposite reaction.
 """
 
-from __future__ import annotations
-
 import functools
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Gauss's principle for bodies without moments of inertia, and singular values of flat linkages."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

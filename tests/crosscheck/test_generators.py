@@ -3,8 +3,6 @@
 Runs are in child processes: CasADi and OpenSim do not share one.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from importlib.util import find_spec

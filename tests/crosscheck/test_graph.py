@@ -1,7 +1,5 @@
 """Spanning trees of random scenes keep mobility, inertia and velocities, and cut loops at fitting joints."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import assume, given

@@ -1,7 +1,5 @@
 """Hints for engines that fail name the defect in the equations of an engine with one known defect."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Scenes imported from MJCF and URDF accelerate as MuJoCo's compiled model of the file."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Inline joints keep a point on a line: motions in mbref and engines against closed form and reference."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

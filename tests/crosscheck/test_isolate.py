@@ -1,7 +1,5 @@
 """Engines in child processes: outcomes of failures, limits, processes that are shared or ended."""
 
-from __future__ import annotations
-
 import math
 import os
 import signal

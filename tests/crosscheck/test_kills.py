@@ -1,7 +1,5 @@
 """Studies and ensembles whose processes are killed: no record is lost, none is written twice."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """One MJCF or URDF file for each kind of part: it moves as MuJoCo's own model, or is refused by name."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

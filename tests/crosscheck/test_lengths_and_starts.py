@@ -1,7 +1,5 @@
 """The judge's scenes / lengths, masses, rows and initial velocities of small scenes worked out by hand."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The limit h → 0: the order, bias and discretisation found / those put into made-up runs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Loads along joints and over time / closed forms, both formulations of the reference, MuJoCo, MJCF."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import mujoco

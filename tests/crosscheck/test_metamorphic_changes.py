@@ -4,8 +4,6 @@ The judge computes the start of the changed scene anew: poses, velocities, accel
 those that the relation expects from the start of the scene itself.
 """
 
-from __future__ import annotations
-
 import functools
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Rows, redundant rows and degrees of freedom / mbref's counts, and scenes worked out by hand."""
 
-from __future__ import annotations
-
 import pytest
 
 import mbref

@@ -1,7 +1,5 @@
 """Momentum, sentences on truths, and stored violations / two free bodies and plain records, by hand."""
 
-from __future__ import annotations
-
 import shlex
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """MuJoCo / truths; callbacks and files that an adapter must not leave behind."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

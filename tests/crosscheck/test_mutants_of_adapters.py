@@ -1,7 +1,5 @@
 """Adapters with one planted defect / the reference."""
 
-from __future__ import annotations
-
 import functools
 import importlib
 import math

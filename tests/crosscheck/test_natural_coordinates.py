@@ -1,7 +1,5 @@
 """Quaternions of rotation matrices, also in extended precision."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

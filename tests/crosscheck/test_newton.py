@@ -1,7 +1,5 @@
 """The engine Newton / truths, the judge's start and accelerations. Its kernels compile for minutes."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 
 import numpy as np

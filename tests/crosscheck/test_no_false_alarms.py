@@ -1,7 +1,5 @@
 """`crosscheck compare` on mechanisms that stand, fall or turn: no engine is blamed for rounding errors."""
 
-from __future__ import annotations
-
 import pytest
 
 from crosscheck.cli.commands import main

@@ -1,7 +1,5 @@
 """Offsets of couplings in crosscheck: the start that the judge checks, engines, tables, refusals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """OndselSolver / truths, Pinocchio, and what it does not offer."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Optional engines / installed packages: what is missing is named, listed, and not run by default."""
 
-from __future__ import annotations
-
 from importlib import metadata
 
 import pytest

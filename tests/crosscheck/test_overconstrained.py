@@ -4,8 +4,6 @@ No row is redundant by itself, and away from closed poses none is redundant at a
 of poses that are not quite closed follows rounding.
 """
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

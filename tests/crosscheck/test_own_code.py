@@ -1,7 +1,5 @@
 """Code or XML that crosscheck shows for a run with an engine / the settings that its adapter makes."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

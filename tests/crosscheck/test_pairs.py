@@ -1,7 +1,5 @@
 """Two parts of one kind at one place: each engine against the motion by Gauss's principle."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 

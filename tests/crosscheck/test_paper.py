@@ -1,7 +1,5 @@
 """Runs / the cells of the paper's tables; singular positions / ranks and residuals known by hand."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections import Counter

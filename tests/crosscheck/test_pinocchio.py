@@ -1,7 +1,5 @@
 """Pinocchio / truths, and the traps that give silently wrong answers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

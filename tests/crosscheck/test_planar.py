@@ -1,7 +1,5 @@
 """Planar joints in every engine / closed forms, and the truth of the mechanism whose guide one replaces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Planar probes: an engine of hinges and slides / the scenes that the suite holds it against."""
 
-from __future__ import annotations
-
 import pytest
 
 from crosscheck.cli.request import find_specimens

@@ -1,7 +1,5 @@
 """MuJoCo's ports / MuJoCo in C at the same settings, and truth; their code is compiled for minutes first."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Digits of a run / single precision, noise, numbers that are no evidence; the precision an engine claims."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

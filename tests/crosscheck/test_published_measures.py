@@ -1,7 +1,5 @@
 """Measures of published problems / motions of a block and of two hinges, off by known amounts."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

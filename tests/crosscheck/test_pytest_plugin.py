@@ -1,7 +1,5 @@
 """The suite as pytest tests: a sound engine and a faulty one / what a developer sees, keeps and replays."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

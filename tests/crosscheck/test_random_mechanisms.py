@@ -1,7 +1,5 @@
 """Random loop mechanisms: mbref's initial accelerations / those of engines and of Gauss's principle."""
 
-from __future__ import annotations
-
 import functools
 from collections import Counter
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Random mechanisms of the conformance suite: their joints, drivers and motions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Reactions of engines / mbref and the judge; shares of redundant hinges / statics by hand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

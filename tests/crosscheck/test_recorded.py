@@ -1,7 +1,5 @@
 """Recorded motions / the reference: exact ones are right, planted differences are the first explanation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The judge's reference / closed forms, other formulations and precisions; its bound, limits and cache."""
 
-from __future__ import annotations
-
 import json
 import time
 from concurrent.futures import ThreadPoolExecutor

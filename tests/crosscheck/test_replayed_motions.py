@@ -4,8 +4,6 @@ Body b turns from 90° to 180° about z, while its centre moves from (1, 2, 0) t
 turns by 90°. Body c moves by (0, 0, 1) without turning.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -4,8 +4,6 @@ The motion of the scene is the judge's, by Gauss's principle.  Loops and mimic j
 read from a URDF are added to its model here, by MjSpec.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Axes of a universal joint that are perpendicular to rounding, or less / one reading in all engines."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

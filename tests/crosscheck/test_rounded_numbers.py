@@ -1,7 +1,5 @@
 """Closed loops with anchors, axes and orientations of 6 or 8 digits / one reading by judge and engines."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """SDF files / the scenes that they were written from, with links and joints in frames of their own."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """SDF files of one link and joint / bodies, joints and sentences worked out by hand."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Included files and gearboxes of SDF."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Parts that adapters share / steps, samples, frames, coordinates and refusals worked out by hand."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Reactions of joints / wrenches of rows, of couplings and of redundant joints worked out by hand."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Simbody / truths, Pinocchio, prescribed motion, and what OpenSim cannot."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 
 import numpy as np

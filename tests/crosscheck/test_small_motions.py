@@ -1,7 +1,5 @@
 """The judge's equilibria, steady motions and eigenvalues / closed forms; engines about the judge's poses."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Settings, groups and sentences of the speed comparison in ``benchmarks``; no time is measured."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Stepping between samples / closed forms: the integrators run outside the engines."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import DOP853

@@ -1,7 +1,5 @@
 """Studies: what was run and stored / what a rerun, an interruption or another executor gives."""
 
-from __future__ import annotations
-
 import json
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context

@@ -1,7 +1,5 @@
 """SUNDIALS IDA / truths, Pinocchio, and what it cannot pass."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Support matrix: engines' refusals and notes / probes of every feature, and Gauss's principle."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Sweeps of the engines: every family coarse to fine, with documented options; other families are refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

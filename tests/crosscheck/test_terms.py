@@ -1,7 +1,5 @@
 """Drake, DART and Bullet / Gauss's principle, truths and each engine's own terms."""
 
-from __future__ import annotations
-
 import functools
 import math
 from importlib.util import find_spec

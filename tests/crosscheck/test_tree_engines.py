@@ -1,7 +1,5 @@
 """Engines on scenes with every joint, driver and load, against Gauss's principle."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Search for the cheapest setting: models of runs with known cost and error / the setting by hand."""
 
-from __future__ import annotations
-
 from argparse import ArgumentTypeError
 from dataclasses import asdict
 from typing import Any, NamedTuple

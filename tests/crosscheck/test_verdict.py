@@ -1,7 +1,5 @@
 """Verdicts and differences: records of known errors and times / grades, sentences, changes."""
 
-from __future__ import annotations
-
 import io
 import re
 from collections.abc import Sequence

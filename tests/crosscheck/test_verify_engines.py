@@ -1,7 +1,5 @@
 """The built-in engines / the checks of the suite, in this process; what fails is known, with its reason."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """Recorded steps of MuJoCo Warp and Newton / the steps of the library, called from Python."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

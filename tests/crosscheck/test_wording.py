@@ -1,7 +1,5 @@
 """Words for numbers and lists / worked out by hand, at the ends of ranges."""
 
-from __future__ import annotations
-
 import pytest
 
 from crosscheck.study.words import text

@@ -1,7 +1,5 @@
 """Three-dimensional scenes for the tree-based engines: every joint, driver and load kind between them."""
 
-from __future__ import annotations
-
 from mbref import rotations
 from mbref.scene import (
     JOINT_TYPES,

@@ -4,8 +4,6 @@ Every case runs in a child process, so that a signal or a hang is found as an ex
 cases ended, and every defect with its seeds; exit status 1 where there is one.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections import Counter

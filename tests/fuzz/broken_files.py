@@ -1,7 +1,5 @@
 """Files of other programs, tables and folders of records: valid ones, and ones that are damaged at random."""
 
-from __future__ import annotations
-
 import json
 import random
 from collections.abc import Sequence

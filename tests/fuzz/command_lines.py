@@ -4,8 +4,6 @@ Each case runs in an empty folder. It checks the exit status, that no traceback 
 a terminal is printed, and that no file is written elsewhere than the command line says.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import functools

@@ -1,7 +1,5 @@
 """Mutations of scenes, methods and limits; each is drawn from a seeded generator."""
 
-from __future__ import annotations
-
 import copy
 import random
 from datetime import date

@@ -4,8 +4,6 @@
 ``command_line``: every command of all programs.  A case that takes long is interrupted, which it has to hear.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import random

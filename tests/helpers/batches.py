@@ -1,7 +1,5 @@
 """Pairs of scenes of one structure whose numbers decide which constraint rows are independent; results."""
 
-from __future__ import annotations
-
 from mbref.motions.motion import Motion
 from mbref.scene import Body, Force, Revolute, Scene, Spring, Translational
 from mbref.scenes import SCENES

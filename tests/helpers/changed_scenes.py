@@ -1,7 +1,5 @@
 """A mechanism in other units, in another frame, or in another order: its motion follows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Mechanisms with couplings and armatures, of which some have closed forms."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Slider-cranks whose drivers come to a dead position, with its time in closed form."""
 
-from __future__ import annotations
-
 import math
 
 from mbref.scene import Scene

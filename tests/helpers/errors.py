@@ -1,7 +1,5 @@
 """Errors of motions against exact states: positions by the mechanism's length, rotations in rad."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Exact states of the short motions, by the judge: python -m tests.helpers.exact_motions stores them."""
 
-from __future__ import annotations
-
 import functools
 import json
 import sys

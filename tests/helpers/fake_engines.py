@@ -1,7 +1,5 @@
 """Engines that misbehave in every way `isolate` has to survive, and one that behaves."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import signal

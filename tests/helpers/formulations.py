@@ -1,7 +1,5 @@
 """Solution of one system of equations of motion by a formulation."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

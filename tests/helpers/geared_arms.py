@@ -1,7 +1,5 @@
 """Two arms on parallel hinges, with or without gears between them."""
 
-from __future__ import annotations
-
 from mbref.scene import Scene
 from tests.helpers.parts import hinge
 

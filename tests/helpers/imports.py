@@ -1,7 +1,5 @@
 """`mbref import` on the text of a file: the scene that it writes and its lines, or its refusal."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

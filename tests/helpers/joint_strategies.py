@@ -1,7 +1,5 @@
 """Strategies of the property tests: directions, poses, joints between two bodies, and states."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import strategies as st
 

@@ -1,7 +1,5 @@
 """Scenes with loads of joints and functions of time, and their closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.polynomial import Polynomial
 

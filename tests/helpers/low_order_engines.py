@@ -3,8 +3,6 @@
 Its Runge–Kutta method of order 8 is replaced by a method of order 1 or 2 whose steps end at the samples.
 """
 
-from __future__ import annotations
-
 import types
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Mechanisms of which verdicts are stored: makers of random ones by a seed, and others by a name."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

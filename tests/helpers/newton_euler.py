@@ -1,7 +1,5 @@
 """Newton's and Euler's equations of each body, from joint reactions, gravity and accelerations alone."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mbref.motions.trajectory import Trajectory

@@ -1,7 +1,5 @@
 """Bodies and joints of test scenes in a few words; all numbers are given, none is random."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

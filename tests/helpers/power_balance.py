@@ -4,8 +4,6 @@ Gravity and springs store energy: the work of all drivers and loads is the chang
 energy, without the energy of the springs, whose power is a load's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

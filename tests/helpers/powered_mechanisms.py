@@ -1,8 +1,6 @@
 """Random mechanisms with all features that do work, under gravity of any direction: armatures, couplings,
 drivers, loads over time, springs of many turns, point masses and massless links."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

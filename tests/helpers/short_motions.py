@@ -4,8 +4,6 @@
 ``tests/doors/motion/exact_motions.json`` stores.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

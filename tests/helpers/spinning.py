@@ -1,8 +1,6 @@
 """Random mechanisms whose joints make many turns: torsion springs of natural angles of many turns, gears and
 torques over time."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mbref import rotations

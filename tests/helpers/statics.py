@@ -1,7 +1,5 @@
 """Mechanisms whose equilibria have closed forms."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbref import Scene

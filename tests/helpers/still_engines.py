@@ -4,8 +4,6 @@ A child process finds them as ``tests.helpers.still_engines:NAME``. The variable
 names the file to which they append.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Records of stored tables, made up: runs on the first mechanism of the closed loops, and refusals."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES

@@ -1,7 +1,5 @@
 """Tables of exact motions, written in the formats of other tools."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Wheels of `falling_engine` in several versions, in a folder that pip reads instead of an index."""
 
-from __future__ import annotations
-
 import zipfile
 from pathlib import Path
 

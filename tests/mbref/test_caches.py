@@ -1,7 +1,5 @@
 """Caches: damaged, truncated, foreign, unwritable and concurrent ones cost time, never a result."""
 
-from __future__ import annotations
-
 import itertools
 import multiprocessing
 import os

@@ -1,7 +1,5 @@
 """Couplings of joint coordinates and armatures: closed forms, equations, reactions, faults."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Design: loops closed with given lengths, exchanges of joints, and diagnosis along a motion."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pictures: names, bars and signs at their places; views; animations that follow the poses of a motion."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import xml.etree.ElementTree as ET

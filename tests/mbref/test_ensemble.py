@@ -1,8 +1,6 @@
 """Ensembles: streamed, resumed and spread runs equal single runs; variants differ in the requested
 numbers."""
 
-from __future__ import annotations
-
 import json
 import math
 import signal

@@ -1,7 +1,5 @@
 """Equilibria and vibrations against closed forms of pendulums, springs and a four-bar."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Error estimates: closed forms, sensitive motions, rounding, ends of second runs, records and commands."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

@@ -1,8 +1,6 @@
 """Interrupts of a compilation inside ``with interrupts_kept()``; each test sends the signal to its own
 process."""
 
-from __future__ import annotations
-
 import contextlib
 import signal
 import threading

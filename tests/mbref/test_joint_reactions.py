@@ -3,8 +3,6 @@
 The multipliers λ balance the forces that a test writes down: Φ_qᵀ λ = Q.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

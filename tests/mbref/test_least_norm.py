@@ -1,7 +1,5 @@
 """Solutions of least norm and null spaces against NumPy's pseudo-inverse, for every rank."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

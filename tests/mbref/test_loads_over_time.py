@@ -1,7 +1,5 @@
 """Loads of joints and functions of time: closed forms, methods that agree, switching, faults, numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Massless links: bodies of mass 0 between the slides of a gantry and between the hinges of a hip."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Motion: bodies and joints by name, energies, tables, plots and files."""
 
-from __future__ import annotations
-
 import csv
 import dataclasses
 import sys

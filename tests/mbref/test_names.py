@@ -1,7 +1,5 @@
 """Names with the characters of markup, paths and other alphabets, in tables and on command lines."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

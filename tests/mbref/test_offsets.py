@@ -1,7 +1,5 @@
 """Offsets of couplings: closed forms, the assembled start, loads that move with it, and faults."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

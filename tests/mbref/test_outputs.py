@@ -1,7 +1,5 @@
 """Outputs of a motion by name: drivers, springs, violations and determined reactions against closed forms."""
 
-from __future__ import annotations
-
 import csv
 import dataclasses
 import sys

@@ -1,8 +1,6 @@
 """Record files: appended records are stored whole, other lines are left unchanged, a full disk loses
 nothing."""
 
-from __future__ import annotations
-
 import json
 import math
 import multiprocessing

@@ -3,8 +3,6 @@
 A probable slip is a valid number that is likely to be a mistake, as an angle in degrees.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from importlib.resources import files

@@ -1,8 +1,6 @@
 """Ensembles that are simulated together: all numbers of a run (``results``) equal those of a single run to
 the bit, also if it fails."""
 
-from __future__ import annotations
-
 import pickle
 from itertools import permutations
 from typing import NamedTuple

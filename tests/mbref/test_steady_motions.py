@@ -1,7 +1,5 @@
 """Steady motions of mechanisms that turn with a driver, against closed forms."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

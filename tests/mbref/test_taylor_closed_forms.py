@@ -1,8 +1,6 @@
 """The method taylor against closed forms: springs, drivers, full turns, phases, and errors over
 tolerances."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

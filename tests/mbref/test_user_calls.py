@@ -1,7 +1,5 @@
 """Calls as users write them: names of files, durations and tolerances."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Imports of the packages as a graph of modules, read from the source and never by importing."""
 
-from __future__ import annotations
-
 import ast
 import functools
 from collections.abc import Iterator, Mapping, Sequence

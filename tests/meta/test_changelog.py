@@ -1,7 +1,5 @@
 """The changelog: one plain line for each change, and a section for the version of the packages."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -26,6 +24,7 @@ def test_newest_released_section_and_the_citation_are_of_the_version_of_the_pack
 
 
 def test_section_has_at_most_60_entries_of_one_line_without_timings():
+    """A line has at most 125 characters; times stand in docs/speed.md."""
     for section in SECTIONS:
         lines = entries(section)
         assert 0 < len(lines) <= MOST, f"{section[:6]} has {len(lines)} entries, at most {MOST} are allowed"

@@ -1,7 +1,5 @@
 """Commands that README and docs print are accepted; `tests/test_printed_commands.py` runs them."""
 
-from __future__ import annotations
-
 import functools
 import re
 
@@ -18,6 +16,7 @@ PARSERS = {
 
 
 def test_pages_print_more_than_50_commands_of_both_programs():
+    """The collector finds them: without any, the test below would have no case."""
     assert len(FOUND) > 50 and {words[0] for _, words in FOUND} >= set(PARSERS)
 
 
@@ -40,6 +39,7 @@ def test_command_that_a_page_prints_is_accepted_by_its_parser(page, words):
 
 
 def test_tests_that_the_gate_names_exist():
+    """.ci/run names tests as FILE::TEST; pytest would end with an error in CI alone."""
     named = re.findall(r"(tests/\S+\.py)::(\w+)", (ROOT / ".ci" / "run").read_text())
     assert named
     for path, name in named:

@@ -1,7 +1,5 @@
 """The documentation: a page for every method, in the site's contents; commands that the parsers know."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 import sys
@@ -36,6 +34,7 @@ def paths(entry: object) -> list[str]:
 
 
 def test_contents_of_the_site_name_every_page_once():
+    """Pages are the files in docs and those that docs/method_pages.py writes."""
     contents = method_pages.with_formulations(yaml.safe_load((ROOT / "mkdocs.yml").read_text())["nav"])
     assert sorted(paths(contents)) == sorted([*(str(page.relative_to(DOCS)) for page in PAGES), *MADE])
 
@@ -80,10 +79,21 @@ def test_every_method_in_a_measured_table_exists():
         Method.parse(name)  # raises for an unknown name
 
 
-def test_page_of_the_scene_format_has_a_figure_of_every_joint_and_load():
+def test_page_of_the_scene_format_shows_a_figure_of_every_joint_and_load_and_of_nothing_else():
+    """A figure that the page shows is drawn by docs/hooks.py when the site is built."""
     text = (DOCS / "scene-format.md").read_text()
-    shown = set(re.findall(r"\]\(figures/((?:joint|load)_\w+)\.svg\)", text))
-    assert shown == {f"joint_{name}" for name in JOINT_TYPES} | {f"load_{name}" for name in LOAD_TYPES}
+    shown = re.findall(r"\]\(figures/((?:joint|load)_\w+)\.svg\)", text)
+    wanted = [*(f"joint_{name}" for name in JOINT_TYPES), *(f"load_{name}" for name in LOAD_TYPES)]
+    assert sorted(shown) == sorted(wanted)
+
+
+def test_site_draws_every_load_that_the_page_of_the_scene_format_shows():
+    """LOADS and OF_SLIDES of docs/hooks.py are the loads that are drawn; joints are drawn by their types."""
+    pytest.importorskip("mkdocs", reason="the extra docs builds the site")
+    pytest.importorskip("latex2mathml", reason="the extra docs builds the site")
+    import hooks
+
+    assert {*hooks.LOADS, *hooks.OF_SLIDES} == set(LOAD_TYPES)
 
 
 def test_page_of_robustness_names_only_existing_tests():

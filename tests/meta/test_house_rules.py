@@ -50,6 +50,7 @@ def test_package_imports_only_packages_below_it(package):
 
 
 def test_engine_is_imported_only_in_adapters_and_inside_functions():
+    """crosscheck works where an engine is not installed."""
     adapters = ROOT / "crosscheck" / "engines"
     elsewhere = [path for path in FILES if not path.is_relative_to(adapters)]
     outside = {name(path): found for path in elsewhere if (found := imports(path) & ENGINE_PACKAGES)}
@@ -78,6 +79,7 @@ def test_at_most_60_lines_are_kept_from_the_formatter():
 
 
 def test_file_has_a_docstring_of_more_than_ten_characters():
+    """The first line counts."""
     first = {name(path): (ast.get_docstring(parsed(path)) or "").partition("\n")[0] for path in FILES}
     assert not [path for path, line in first.items() if len(line) <= 10]
 
@@ -137,14 +139,18 @@ def test_a_name_of_a_class_or_constant_has_one_meaning_in_mbref():
 
 
 def test_page_of_methods_lists_every_stabilisation():
+    """A row of a table of docs/methods.md begins with the name."""
     text = (ROOT / "docs" / "methods.md").read_text()
     listed = set(re.findall(r"^\| `([\w-]+)`", text, flags=re.M))
     assert set(STABILISATIONS) <= listed, f"docs/methods.md does not list {set(STABILISATIONS) - listed}"
 
 
-def test_readme_has_at_most_120_lines_and_links_of_pages_lead_to_files():
-    text = (ROOT / "README.md").read_text()
-    assert len(text.splitlines()) <= 120, len(text.splitlines())
+def test_readme_has_at_most_120_lines():
+    assert len((ROOT / "README.md").read_text().splitlines()) <= 120
+
+
+def test_links_of_readme_and_docs_to_files_lead_to_files():
+    """Links to figures are left out: docs/hooks.py draws them."""
     for path in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md")):
         links = re.findall(r"\]\(([^)#:]+)\)", path.read_text())
         there = [link for link in links if "figures/" not in link]  # made by docs/hooks.py
@@ -153,11 +159,13 @@ def test_readme_has_at_most_120_lines_and_links_of_pages_lead_to_files():
 
 
 def test_key_of_every_integrator_and_scene_is_its_name():
+    """INTEGRATORS and SCENES are the tables that command lines look names up in."""
     assert all(key == integrator.name for key, integrator in INTEGRATORS.items())
     assert all(key == make().name for key, make in SCENES.items())
 
 
-def test_gate_runs_the_commands_of_the_readme_and_the_linters():
+def test_gate_reads_its_commands_from_the_readme_and_runs_the_linters():
+    """README's second command installs the linters, which .ci/run calls in that environment."""
     gate = (ROOT / ".ci" / "run").read_text()
     assert "README.md" in gate
     commands = re.findall(r"^python3 -m venv .*$", (ROOT / "README.md").read_text(), flags=re.M)
@@ -167,7 +175,8 @@ def test_gate_runs_the_commands_of_the_readme_and_the_linters():
         assert f".venv/bin/{check}" in gate, f"the gate does not run {check}"
 
 
-def test_slow_tests_run_only_in_make_deep():
+def test_slow_tests_are_left_out_by_default_and_run_by_make_deep():
+    """The default options of pytest, and the options in the Makefile."""
     options = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pytest"]["ini_options"]
     assert "not slow" in options["addopts"], options["addopts"]
     assert '-m "slow or not slow"' in (ROOT / "Makefile").read_text(), "make deep leaves slow tests out"

@@ -1,7 +1,5 @@
 """Messages are in plain words; `python -m tests.messages` prints all of them in a row."""
 
-from __future__ import annotations
-
 import functools
 import re
 
@@ -22,12 +20,14 @@ def every_message():
 
 
 def test_messages_contain_no_private_word():
+    """WORDS are words of this project's history; more than 800 messages are read from the source."""
     assert len(every_message()) > 800, len(every_message())
     wrong = [f"{place}:{line}: {text}" for place, line, text in every_message() if WORDS.search(text)]
     assert not wrong, "\n".join(wrong)
 
 
 def test_messages_contain_no_phrase_without_a_noun():
+    """RIDDLES are such phrases, of which a user has to guess the thing that is meant."""
     wrong = [f"{place}:{line}: {text}" for place, line, text in every_message() if RIDDLES.search(text)]
     assert not wrong, "\n".join(wrong)
 

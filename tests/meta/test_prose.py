@@ -1,7 +1,5 @@
 """README, CHANGELOG and docs are in plain words: no fault by proselint with the rules of tests/prose.toml."""
 
-from __future__ import annotations
-
 import pytest
 
 pytest.importorskip("proselint", reason="installed by the extra `dev`")
@@ -17,7 +15,8 @@ def test_page_has_no_fault_by_the_rules_of_prose(path):
 
 
 @pytest.mark.parametrize("path", PAGES, ids=[str(path.relative_to(prose.ROOT)) for path in PAGES])
-def test_page_begins_with_a_sentence_and_soon_shows_code_or_a_picture(path):
+def test_page_begins_with_a_sentence_and_shows_code_or_a_picture_in_30_lines(path):
+    """The first line is the title; the changelog shows no code."""
     lines = path.read_text().splitlines()
     first = next(line for line in lines[1:] if line)
     assert lines[0].startswith("# ") and first[:1] not in "#|-", first
@@ -37,4 +36,6 @@ def test_page_begins_with_a_sentence_and_soon_shows_code_or_a_picture(path):
     ],
 )
 def test_faults_of_prose_are_found_with_their_lines(text, lines):
+    """Private words, sentences of more than 36 words, and faults by proselint; code and names are left
+    out."""
     assert [line for line, _ in prose.faults(text)] == lines

@@ -1,7 +1,5 @@
 """Tests go through doors: no private names, few patches at listed seams, no stand-ins, clear names."""
 
-from __future__ import annotations
-
 import ast
 import functools
 from collections import Counter
@@ -83,6 +81,7 @@ def private_uses(path: Path) -> Iterator[str]:
 
 
 def test_tests_use_no_private_name_of_the_product():
+    """Private names begin with an underscore: a change inside the product breaks no test."""
     found = {name_of(path): names for path in TESTS if (names := sorted(set(private_uses(path))))}
     assert not found, found
 
@@ -110,6 +109,7 @@ def patches(path: Path) -> Iterator[str]:
 
 
 def test_tests_patch_the_product_only_at_listed_seams():
+    """At most 60 patches, and each at a name in SEAMS."""
     found = {name_of(path): list(patches(path)) for path in TESTS}
     beside = {path: names for path, each in found.items() if (names := [n for n in each if n not in SEAMS])}
     assert not beside, beside
@@ -128,6 +128,7 @@ def test_tests_use_no_mocks():
 
 
 def test_names_of_test_files_contain_no_vague_word():
+    """VAGUE lists words that name no behaviour."""
     vague = [name_of(path) for path in TESTS if any(word in path.stem.split("test_")[-1] for word in VAGUE)]
     assert not vague, vague
 
@@ -138,5 +139,6 @@ def lines(folders: tuple[str, ...]) -> int:
 
 
 def test_tests_have_at_most_55_lines_for_100_of_the_product():
+    """A line of tests costs as much to keep as a line of the product."""
     ratio = lines(("tests",)) / lines(PRODUCT)
     assert ratio <= MOST_RATIO, f"{ratio:.2f} lines of tests for a line of the product"

@@ -1,7 +1,5 @@
 """Types: mypy is strict for each file without a kernel, whose types numba finds."""
 
-from __future__ import annotations
-
 import ast
 import tomllib
 from pathlib import Path
@@ -19,6 +17,7 @@ def has_kernels(path: Path) -> bool:
 
 
 def test_mypy_ignores_exactly_the_files_with_kernels():
+    """pyproject.toml lists them; a kernel has one of the decorators in DECORATORS."""
     overrides = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["mypy"]["overrides"]
     ignored = {name for o in overrides if o.get("ignore_errors") for name in o["module"]}
     modules = {**sources("mbref"), **sources("crosscheck"), **sources("reports")}

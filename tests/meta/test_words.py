@@ -1,7 +1,5 @@
 """Plain words in docstrings and comments: a verb or a noun at the beginning, and no private words."""
 
-from __future__ import annotations
-
 import ast
 import io
 import re
@@ -65,6 +63,7 @@ def test_docstrings_and_comments_contain_no_private_word():
     ],
 )
 def test_private_words_and_verbless_beginnings_are_found(tmp_path, text, count):
+    """In docstrings and comments, not in code and quotations."""
     path = tmp_path / "module.py"
     path.write_text(text)
     assert len(faults(path)) == count

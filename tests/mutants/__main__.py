@@ -11,8 +11,6 @@ This is a tool to find cases that the tests lack: a mutant survives where no tes
 where the line makes none.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

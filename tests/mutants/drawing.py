@@ -1,7 +1,5 @@
 """Which mutants are drawn of the packages."""
 
-from __future__ import annotations
-
 import random
 import re
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """The mutants of a source: every change of one place in its syntax tree that an operator makes."""
 
-from __future__ import annotations
-
 import ast
 import difflib
 import re

@@ -4,8 +4,6 @@ A fork begins in a fraction of a second. It imports the project's packages anew,
 in the copy, as plain Python (``NUMBA_DISABLE_JIT=1``).
 """
 
-from __future__ import annotations
-
 import compileall
 import contextlib
 import hashlib

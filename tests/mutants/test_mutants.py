@@ -1,7 +1,5 @@
 """Random mutants differ from their source and compile, and tests of a tiny package kill them."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -35,6 +33,7 @@ def test_{0}():
 
 
 def test_every_mutant_differs_from_its_source_and_compiles():
+    """Each of more than 20 mutants of one file; KINDS are the kinds of changes."""
     path = "mbref/motions/energy.py"
     source = (ROOT / path).read_text()
     made = mutants(path, source)
@@ -45,6 +44,8 @@ def test_every_mutant_differs_from_its_source_and_compiles():
 
 
 def test_random_mutants_depend_on_the_seed_alone():
+    """Two draws of 20 by the seed 1 are equal, a draw by the seed 2 differs, all from the folder asked
+    for."""
     first, again, other = (drawn(ROOT, seed, 20, ["mbref/motions/drawing"]) for seed in (1, 1, 2))
     assert first == again and len(set(first)) == 20 and set(first) != set(other)
     assert all(mutant.file.startswith("mbref/motions/drawing/") for mutant in first)
@@ -52,8 +53,9 @@ def test_random_mutants_depend_on_the_seed_alone():
 
 @pytest.mark.slow
 def test_mutant_of_a_small_package_is_killed_by_the_test_that_runs_its_line(tmp_path):
-    """A sum is tested, a product is not (3 · 1 = 3 / 1), and a mutant that loops for ever counts as
-    killed."""
+    """total(2, 3) is tested. The test of the product, 3 · 1, passes with the quotient, too: this mutant
+    survives. A mutant that loops for ever counts as killed, and a test that fails without mutants is left
+    out."""
     for name in ("mutants", "__init__.py"):
         (tmp_path / "tests").mkdir(exist_ok=True)
         (tmp_path / "tests" / name).symlink_to(ROOT / "tests" / name)

@@ -1,7 +1,5 @@
 """Random mechanisms: mbref's motion and reactions against the judge's equations, work and energy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings

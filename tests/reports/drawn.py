@@ -1,7 +1,5 @@
 """Bars read back from pictures of mechanisms."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 
 import numpy as np

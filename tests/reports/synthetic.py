@@ -1,7 +1,5 @@
 """Records made without any engine: exact motions with errors of known size, and runs that fail."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import hashlib

@@ -1,7 +1,5 @@
 """Sections on accelerations, reactions and support / records with known differences put in."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -72,7 +70,8 @@ def test_accelerations_table_shows_the_difference_put_in():
     assert abs(float(shown["mujoco"]) / expected - 1) < 0.05, f"put in {expected:.2e}, shown {shown}"
 
 
-def test_support_section_has_the_engines_of_the_records():
+def test_support_section_has_a_column_for_each_engine_of_the_records():
+    """Both engines declare revolute joints."""
     (table,) = [b for b in support.render([runs_of("planar_slider_crank_gravity")]) if isinstance(b, Table)]
     assert list(table.header) == ["Feature", "pinocchio", "mujoco"], table.header
     assert ("revolute joint", "✓", "✓") in table.rows, table.rows[:3]
@@ -143,4 +142,5 @@ def test_branch_that_ended_early_says_so_and_stands_still(parted):
 
 
 def test_scene_without_singular_positions_has_no_table_of_them():
+    """The spatial slider-crank passes none in 0.01 s; the section is empty."""
     assert not crossings.render(runs_of("spatial_slider_crank_gravity"))

@@ -1,7 +1,5 @@
 """The section on closed loops / cells, rows, depths of colour and commands worked out by hand."""
 
-from __future__ import annotations
-
 import pytest
 
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES
@@ -57,6 +55,8 @@ def test_default_rows_are_the_engines_with_a_run_of_defaults(section):
 
 
 def test_each_engine_s_runs_are_listed_with_one_command_a_mechanism(section):
+    """MuJoCo has two runs of the first mechanism, of which the best has the command. Pinocchio refused it,
+    without a command, and ran the second."""
     folds = {block.summary: block.blocks for block in section if isinstance(block, Fold)}
     table, text, commands = folds["mujoco 4.0.0"]
     assert isinstance(table, Table)

@@ -1,7 +1,5 @@
 """The committed page on the paper: its text / its records, rendered again; the page of the site."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -24,13 +22,15 @@ def records():
     return collection.stored_paper(FOLDER)
 
 
-def test_text_is_rendered_from_the_records(records):
+def test_committed_text_on_the_paper_follows_from_the_stored_records(records):
+    """reports/paper/report.md is rendered again, and is equal letter by letter."""
     text = render.markdown(paper.render(*records), program.TITLES[program.PAPER,])
     kept = (FOLDER / "report.md").read_text()
     assert text == kept, "crosscheck report --section paper --render reports/paper renews it"
 
 
-def test_every_cell_and_the_studies_of_growth_and_gain_have_records(records):
+def test_every_cell_of_the_paper_and_two_studies_have_stored_records(records):
+    """CELLS are the cells of the paper's tables; the studies are of growing violations and of gains."""
     missing = [c for c in CELLS if Label(c.table, c.row, c.column) not in records.records]
     assert not missing, missing
     assert has(records.records, "growth") and has(records.records, "gain")
@@ -57,7 +57,8 @@ def test_no_stored_run_of_the_paper_timed_out_or_crashed(records):
     assert not ended, ended
 
 
-def test_page_of_the_site_has_the_text_of_the_report():
+def test_page_of_the_site_has_the_tables_and_figures_of_the_report_on_the_paper():
+    """As many lines of tables as the report, more than 100."""
     pytest.importorskip("mkdocs", reason="the extra docs builds the site")
     import importlib.util
 

@@ -1,7 +1,5 @@
 """The committed stability ladders: their text / their records, rendered again; a record for every run."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -20,7 +18,8 @@ def records():
     return stored_ladders(FOLDER)
 
 
-def test_text_is_rendered_from_the_records(records):
+def test_committed_text_on_stability_follows_from_the_stored_records(records):
+    """reports/stability/report.md is rendered again, and is equal letter by letter."""
     text = render.markdown(section.render(records), program.TITLES[program.STABILITY,])
     kept = (FOLDER / "report.md").read_text()
     assert text == kept, "crosscheck report --section stability --render reports/stability renews it"

@@ -51,11 +51,12 @@ def violations(verified) -> Table:
     return found
 
 
-def test_conformance_section_needs_records(tmp_path):
+def test_conformance_section_without_records_is_empty(tmp_path):
     assert conformance.render(stored.verified(tmp_path)) == []
 
 
-def test_explanations_name_known_engines_and_checks():
+def test_explanations_name_known_engines_and_checks_and_every_check_has_a_proof():
+    """The explanations are of violations by engines; a proof is a planted defect that the check detects."""
     for engine, check, _ in explained.explanations():
         assert engine.partition(" ")[0] in engine_names(), engine
         assert check in {*FIRST, *PROPERTIES, AGREEMENT}, check
@@ -88,8 +89,11 @@ def test_random_violations_are_counted_by_check_with_the_worst_of_each(tmp_path)
 
 
 def test_each_committed_violation_on_a_mechanism_of_the_suite_has_a_cause():
+    """An engine, a check and a scene are the key of an explanation."""
     known = explained.explanations()
-    for found in stored.verified(ROOT / "reports" / "reference"):
+    verdicts = stored.verified(ROOT / "reports" / "reference")
+    assert verdicts
+    for found in verdicts:
         failed = [v for v in found.get("verdicts", ()) if v["status"] == "fail"]
         unknown = [(v["property"], v["scene"]) for v in failed]
         unknown = [pair for pair in unknown if (found["engine"], *pair) not in known]

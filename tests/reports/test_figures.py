@@ -1,7 +1,5 @@
 """Figures: what the records say / what is drawn."""
 
-from __future__ import annotations
-
 import functools
 import io
 import re
@@ -30,6 +28,7 @@ def pixels(png: bytes) -> int:
 
 
 def test_every_scene_has_its_four_figures():
+    """Two scenes with records: the moving mechanism, speed against error, violation and energy over time."""
     kinds = ("mechanism", "speed", "violation", "energy")
     wanted = {f"{name}-{kind}" for name in ("spatial_slider_crank", "planar_slider_crank") for kind in kinds}
     assert set(pictures()) == wanted, set(pictures()) ^ wanted
@@ -39,6 +38,8 @@ def test_every_scene_has_its_four_figures():
     "name", [f"spatial_slider_crank-{k}" for k in ("mechanism", "speed", "violation", "energy")]
 )
 def test_figure_is_not_blank_and_reproducible(name):
+    """Drawn twice it is the same SVG. A blank picture has no ten paths, and not 60 different rows of
+    pixels."""
     picture = pictures()[name]
     once, again = figures.svg(picture.draw(), name), figures.svg(picture.draw(), name)
     assert once == again, f"{name} changes from one drawing to the next"
@@ -47,7 +48,8 @@ def test_figure_is_not_blank_and_reproducible(name):
 
 
 def test_speed_plot_has_a_mark_for_each_run():
-    """Completed runs at their error and seconds; three failed ones in a strip, numbered by cause."""
+    """Completed runs have marks at the recorded error and seconds. Three failed runs have marks in a strip
+    beside the plot, 1 and 2 by their cause."""
     group = groups()[0]
     failures = speed.failed(group.runs)
     main, strip = speed.plot(group, failures).axes
@@ -80,7 +82,8 @@ def test_twelve_curves_of_an_engine_have_one_colour_and_different_lines():
     assert {look["color"] for look in looks.values()} == {figures.colour("mbref")}
 
 
-def test_powers_of_ten_are_plain_text():
+def test_powers_of_ten_at_the_axes_are_plain_text():
+    """10⁻⁷ with raised digits, not a formula, so that the text can be found and copied."""
     picture, (axes,) = figures.canvas()
     axes.plot([1e-7, 1e-3, 1.0], [2.0, 3.0, 5.0])
     axes.set(xscale="log", yscale="log")
@@ -95,6 +98,7 @@ def test_title_with_dollar_signs_is_shown_as_it_is():
 
 
 def test_figure_files_have_neither_date_nor_program():
+    """A figure drawn again on another day, or by another version, is the same file."""
     figure, _ = figures.canvas(2.0, 2.0)
     text = figures.svg(figure, "one")
     assert "<dc:date>" not in text and "Matplotlib" not in text

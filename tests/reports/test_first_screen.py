@@ -1,7 +1,5 @@
 """The first screen: records / the matrix, the moving mechanism, the figure that can be asked, the records."""
 
-from __future__ import annotations
-
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -45,7 +43,8 @@ def test_opening_names_the_worst_run_and_who_is_right():
     assert opening.sentences["Who is right"].startswith("mbref is inaccurate at best on spatial_slider_crank")
 
 
-def test_links_of_the_page_lead_to_the_records_of_runs(page):
+def test_links_of_the_page_lead_to_places_of_the_page_and_every_run_has_one(page):
+    """No place's id occurs twice."""
     ids = set(re.findall(r' id="([^"]+)"', page))
     links = set(re.findall(r'href="#([^"]+)"', page))
     assert links <= ids, links - ids
@@ -55,6 +54,8 @@ def test_links_of_the_page_lead_to_the_records_of_runs(page):
 
 
 def test_marks_of_the_speed_figure_have_the_records_errors_and_times():
+    """One mark for each completed run, with its numbers; each has a title to point at, and so has the
+    figure."""
     plot = one(Plot)
     marks = re.findall(r'data-error="([^"]+)" data-seconds="([^"]+)"', plot.svg)
     shown = [(f"{r.error:.4g}", f"{r.seconds:.4g}") for r in groups()[0].completed()]

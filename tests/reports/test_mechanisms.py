@@ -1,7 +1,5 @@
 """Mechanisms of the report and the README: what is drawn / the trajectories that it was made of."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 
 import numpy as np
@@ -29,10 +27,11 @@ def test_exact_run_is_drawn_on_the_exact_motion():
     for a, b in zip(behind, before, strict=True):
         assert (a == b).all() and len(a) == len(true.times)
     lengths = np.hypot(*(before[0][:, 1] - before[0][:, 0]).T)
-    assert np.ptp(lengths) < 0.3, lengths
+    assert np.ptp(lengths) < 0.3, lengths  # px; both ends are rounded to 0.1 px
 
 
-def test_run_that_ended_early_is_drawn_at_its_last_sample():
+def test_run_that_ended_early_stands_still_at_its_last_sample():
+    """The run ends at half the duration: frames from there on are equal, and differ from the first one."""
     crank = scene("planar_slider_crank")
     true, part = exact(crank), exact(crank, share=0.5)
     early = bars(mechanisms.over_truth(crank, true, part, "mujoco"))[0]
@@ -40,6 +39,7 @@ def test_run_that_ended_early_is_drawn_at_its_last_sample():
 
 
 def test_compared_runs_are_drawn_with_title_error_and_singular_positions():
+    """Two runs with an error of 0.5, side by side, and a singular position at 0.01 s. No script is needed."""
     shown = Run(record("mujoco", "defaults", 0.5, 0.1, step=0.1, margin=3))
     picture = mechanisms.compared(scene(), exact(scene()), [shown, shown], [0.01])
     texts = [node.text for node in ET.fromstring(picture).iter(f"{SVG}text")]
@@ -85,7 +85,7 @@ def test_branches_share_one_view_and_mark_the_crossing():
 
 @pytest.mark.parametrize("name", ["spatial_slider_crank", "planar_slider_crank", "four_bar", "five_bar"])
 def test_both_bodies_of_a_joint_are_drawn_through_a_common_point(name):
-    """Both bodies of every joint that keeps its points together are drawn through a common point."""
+    """Some drawn point of one body is, in each frame, at a drawn point of the other to rounding, 1e-9 m."""
     a_scene = SCENES[name]().with_(duration=0.02)
     trajectory = exact(a_scene)
     parts = {s.name: carried(s.points, trajectory, b) for b, s in enumerate(shapes(a_scene))}
@@ -98,8 +98,8 @@ def test_both_bodies_of_a_joint_are_drawn_through_a_common_point(name):
 
 
 @pytest.mark.parametrize(("name", "count"), [("planar_slider_crank_equal", 4), ("planar_slider_crank", 0)])
-def test_slider_crank_is_singular_only_with_equal_lengths(name, count):
-    """With equal lengths the crank passes θ = ±π/2; with unequal ones nothing is singular."""
+def test_marked_instants_are_the_singular_positions_of_a_slider_crank_of_equal_lengths(name, count):
+    """With equal lengths the crank passes θ = ±π/2 four times; with unequal ones nothing is singular."""
     crank = SCENES[name]()
     found = singular_instants(crank)
     assert len(found) == count, found

@@ -1,8 +1,6 @@
 """Pages of the documentation that are made from records: they follow from the stored records and the links
 within each lead to places of the page."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -22,6 +20,7 @@ def page(request) -> tuple[str, str]:
 
 
 def test_committed_page_follows_from_the_stored_records(page):
+    """It is made again, and is equal letter by letter."""
     name, made = page
     assert (RESULTS / f"{name}.md").read_text() == made, f"python -m reports.pages {name} renews it"
 
@@ -36,6 +35,7 @@ def test_links_within_a_page_lead_to_its_headings_and_folded_runs(page):
 
 
 def test_every_page_folds_some_of_its_text(page):
+    """Folds are <details> elements, each of which is closed."""
     _, made = page
     assert made.count("<details") == made.count("</details>") > 0
 
@@ -48,6 +48,7 @@ def test_page_of_runs_shows_less_than_a_fifth_of_its_text_and_folds_the_rest(nam
 
 
 def test_command_writes_the_page_of_the_records_that_it_is_given(tmp_path):
+    """Of all stored runs those by mbref are given: the page has no place for Drake."""
     records, out = tmp_path / "few.jsonl", tmp_path / "page.md"
     rewrite(records, [r for r in looked_at(FILE).values() if r["engine"] == "mbref"])
     assert crosscheck(["closed-loops", "--records", str(records), "--page", str(out)]) == 0

@@ -1,7 +1,5 @@
 """The paper's section: made-up records / the marks, numbers and words in its tables; nothing is simulated."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any
@@ -137,6 +135,7 @@ def test_changed_cells_are_listed_with_their_causes(blocks):
 
 
 def test_every_cell_of_the_paper_is_marked_in_a_table(blocks):
+    """Its cell begins with = (as printed), ≈ (at another time) or ≠."""
     marks = [cell for t in tables(blocks, "Method") for row in t.rows for cell in row if cell[:1] in "=≈≠"]
     assert len(marks) == len(CELLS), f"{len(marks)} marked cells of {len(CELLS)}"
 
@@ -158,6 +157,7 @@ def test_paper_section_without_studies_lacks_only_their_headings(records, blocks
 
 
 def test_indexed_records_return_under_their_labels(records, tmp_path):
+    """A label is the table, row and column of the paper; the file has keys of runs alone."""
     chosen = dict(list(runs.cases().items())[:5])
     for label, case in chosen.items():
         append(tmp_path / store.FILE, {**records[label], "key": key(case)})
@@ -168,6 +168,7 @@ def test_indexed_records_return_under_their_labels(records, tmp_path):
 
 
 def test_stored_record_has_a_motion_only_if_a_figure_draws_it(records):
+    """The figure of peaks draws a violation, which is that of the exact motion: rounding."""
     table, drawn = records[Label("I", "ALF", "θ₂ = π/4")], records[runs.PEAKS]
     assert Run(table).trajectory.times.size == 0 and not table["violation"]
     assert len(drawn["violation"]) == len(drawn["times"]) > 1 and max(drawn["violation"]) < 1e-9
@@ -215,8 +216,9 @@ def test_exact_crank_record_follows_the_true_branch(records):
     assert all(row["Crank, rad/s"] == row["True"] for row in cells(found))
 
 
-def test_exact_accelerations_have_all_digits(records):
-    """Their errors are rounding; a run that failed at its start has none (NaN)."""
+def test_digits_of_exact_accelerations_are_all_and_of_a_run_that_failed_at_its_start_unknown(records):
+    """Errors of the records, made from exact motions, are below 50 roundings; without a sample they are
+    NaN."""
     for name, errors in paper_methods.digit_errors(records).items():
         assert max(errors) < 1e-14, (name, errors)
     missing = Label("digits", "alf", "100")

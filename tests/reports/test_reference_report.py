@@ -19,8 +19,9 @@ def groups() -> list[SceneRuns]:
     return stored.groups(FOLDER)
 
 
-def test_text_is_rendered_from_the_records(groups):
-    """All sections except for the reactions, whose analysis takes longer than all others."""
+def test_sections_of_the_committed_report_follow_from_the_stored_records(groups):
+    """Each of more than 100 blocks stands in report.md. The section on reactions, the dearest one, is
+    rendered by the slow test below."""
     text = (FOLDER / "report.md").read_text()
     names = [name for name in sections.NAMES if name != "reactions"]
     blocks = sections.blocks(groups, names, stored.verified(FOLDER))
@@ -31,7 +32,8 @@ def test_text_is_rendered_from_the_records(groups):
 
 
 @pytest.mark.slow
-def test_committed_text_is_rendered_from_the_records_and_its_numbers_stand_in_the_page(groups):
+def test_committed_report_follows_from_the_stored_records_and_the_page_has_all_its_numbers(groups):
+    """report.md is equal letter by letter; numbers with an exponent are looked for in the page."""
     blocks = sections.blocks(groups, verified=stored.verified(FOLDER))
     assert render.markdown(blocks) == (FOLDER / "report.md").read_text()
     drawn = [b.figure if isinstance(b, Plot) else b for b in blocks if isinstance(b, Figure | Plot)]
@@ -41,6 +43,8 @@ def test_committed_text_is_rendered_from_the_records_and_its_numbers_stand_in_th
 
 
 def test_committed_records_are_of_the_current_scenes(groups):
+    """The stored scenes are the built-in ones, except for the duration that was asked for."""
+    assert groups
     for group in groups:
         assert group.scene == SCENES[group.scene.name]().with_(duration=group.scene.duration)
 

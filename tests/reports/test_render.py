@@ -1,7 +1,5 @@
 """The written report: blocks / page, Markdown and pictures; and the program that writes it."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -57,6 +55,7 @@ def test_page_opens_offline(written):
 
 
 def test_contents_of_the_page_lead_to_its_sections(written):
+    """Links up to the end of <nav> are the contents."""
     page = (written / "index.html").read_text()
     targets, ids = (
         re.findall(r'href="#([\w-]+)"', page.split("</nav>")[0]),
@@ -81,6 +80,7 @@ def test_markdown_shows_eight_figures_as_png_and_svg(written):
 
 
 def test_markdown_table_has_one_line_for_each_row(written, parts):
+    """Two more lines are the header and the rule below it; a line break in a cell would break a row."""
     lines = (written / "report.md").read_text().split("\n")
     rows = [b.rows if isinstance(b, Table) else b.scenes for b in parts if isinstance(b, Table | Matrix)]
     assert sum(line.startswith("| ") for line in lines) == sum(len(of_table) + 2 for of_table in rows)
@@ -98,7 +98,8 @@ def few(scenes, engines) -> selection.Sweep:
 
 
 def test_short_runs_are_timed_five_times_and_long_runs_once(tmp_path):
-    """A fake engine runs 0.1, 0.2, 0.5 s and twice LONG; the stored times stay its own."""
+    """A fake engine says that its runs take 0.1, 0.2, 0.5 s and 2 LONG, where LONG is the time from which one
+    run suffices; the stored costs stay as it says."""
     cases, _ = few([still("still")], [FAKE])
     long = cases[0]._replace(setting=Setting("plain", {"seconds": 2 * LONG}))
     cases = [*cases, long]

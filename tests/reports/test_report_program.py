@@ -1,7 +1,5 @@
 """The program that writes a report: refusals, before anything runs."""
 
-from __future__ import annotations
-
 import pytest
 
 from reports import __main__ as program
@@ -15,13 +13,15 @@ def test_paper_section_refuses_scenes_and_engines(tmp_path, capsys, asked, given
     assert not folder.exists()
 
 
-def test_report_on_a_faulty_scene_file_is_refused_with_its_faults(tmp_path, capsys):
+def test_report_on_a_faulty_scene_file_is_refused_with_the_faulty_field(tmp_path, capsys):
+    """Gravity is a number instead of a vector; no folder is made."""
     (tmp_path / "bad.toml").write_text("gravity = 3\n")
     assert program.main([str(tmp_path / "bad.toml"), "--out", str(tmp_path / "out")]) == 2
     assert "gravity" in capsys.readouterr().err and not (tmp_path / "out").exists()
 
 
 def test_report_without_its_packages_says_what_to_install(capsys, monkeypatch):
+    """The seam `find_spec` finds no package, as where the extra `report` is not installed."""
     monkeypatch.setattr(program, "find_spec", lambda package: None)
     assert program.main([]) == 2
     assert "pip install 'mbref[report]'" in capsys.readouterr().err

@@ -1,7 +1,5 @@
 """The extract of a comparison in docs/compare.md: its lines and those that a comparison prints."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -27,6 +25,7 @@ def printed() -> str:
 
 
 def test_extract_in_the_docs_has_the_printed_headings_in_order(printed):
+    """The comparison of stored runs prints seven headings; their first 12 letters are compared."""
     _, extract, _ = re.split("<!-- /?compare -->", PAGE.read_text())
     shown = [line for line in extract.splitlines() if HEADINGS.match(line)]
     starts = [line[:12].strip() for line in printed.splitlines() if HEADINGS.match(line)]
@@ -34,5 +33,6 @@ def test_extract_in_the_docs_has_the_printed_headings_in_order(printed):
 
 
 def test_extract_in_the_docs_has_the_printed_columns(printed):
+    """The line of headings from "engine, family" to "ratio" is among the printed lines."""
     [columns] = re.findall(r"^ +engine, family .* ratio$", PAGE.read_text(), re.M)
     assert columns.split() in [line.split() for line in printed.splitlines()]

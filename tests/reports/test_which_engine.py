@@ -1,7 +1,5 @@
 """The page "Which engine, which settings": its text follows from the committed records."""
 
-from __future__ import annotations
-
 import zipfile
 
 import pytest
@@ -13,6 +11,7 @@ from reports.stored import groups
 
 
 def test_every_scene_of_the_page_has_records():
+    """The page's kinds of mechanisms name the scenes; FOLDERS have the committed records."""
     known = {group.scene.name for name in FOLDERS for group in groups(REPORTS / name)}
     assert known >= {name for kind in KINDS for name in kind.scenes}
 
@@ -50,6 +49,7 @@ def test_page_says_none_for_an_engine_whose_runs_all_failed(folder):
 
 
 def test_records_without_a_truth_are_refused(folder):
+    """The file of truths is emptied: no run can be judged."""
     (folder / "truths.jsonl").write_text("")
     (group,) = groups(folder)
     with pytest.raises(ValueError, match="no record of its truth"):

@@ -1,8 +1,6 @@
 """Planted defects of one line, applied one at a time to the example engine, with the check that detects
 each."""
 
-from __future__ import annotations
-
 import tomllib
 import types
 from collections.abc import Callable

@@ -1,8 +1,6 @@
 """The table of checks and the defects that prove them, written by ``python -m tests.zoo.table
 docs/results/conformance.md``, and the same as data for reports."""
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 

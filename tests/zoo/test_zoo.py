@@ -1,8 +1,6 @@
 """Every planted defect fails the named check, every check has a defect, and the sound engine passes all
 checks."""
 
-from __future__ import annotations
-
 import functools
 import tomllib
 from pathlib import Path
@@ -27,7 +25,8 @@ def sound_bench(scene: str, has_ways: bool = False) -> trial.Bench:
 
 @pytest.mark.parametrize("about", DEFECTS)
 def test_planted_defect_fails_its_check_which_the_sound_engine_passes(about):
-    """The table tests/zoo/defects.toml names a check and a scene for each change of one line."""
+    """tests/zoo/defects.toml names a check and a scene for each change of one line in the example engine. The
+    check fails on the scene though the faulty engine completes its run, and passes without the change."""
     defect = DEFECTS[about]
     runner = InProcess(engine(defect, defect.has_ways))
     sound = suite.verdict_on(defect.check, sound_bench(defect.scene, defect.has_ways))
@@ -45,17 +44,20 @@ def test_planted_defect_fails_its_check_which_the_sound_engine_passes(about):
 
 
 def test_every_check_has_a_defect_that_it_detects():
+    """Of the table: the test above shows that the check detects it."""
     idle = {*suite.FIRST, *PROPERTIES} - {defect.check for defect in DEFECTS.values()}
     assert not idle, f"no defect of the zoo trips {sorted(idle)}"
 
 
 def test_scene_of_every_defect_belongs_to_the_suite():
+    """The table names scenes of the conformance suite, which a user's engine runs, too."""
     unknown = {defect.scene for defect in DEFECTS.values()} - set(SPECIMENS)
     assert not unknown, unknown
 
 
 @pytest.mark.slow
 def test_sound_engine_passes_the_whole_suite():
+    """The example engine without a defect violates no check on any mechanism."""
     found = suite.held_against(InProcess(engine()), specimens(deep=True))
     failed = [v for v in found.verdicts if v.status == suite.FAIL]
     assert found.conforms, failed

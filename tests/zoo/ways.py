@@ -1,7 +1,5 @@
 """Linear solvers that make the example engine a fake engine with alternatives."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.sparse import csr_array

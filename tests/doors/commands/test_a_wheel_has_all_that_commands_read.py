@@ -1,7 +1,5 @@
 """The wheel, installed into an empty environment in another folder, runs one of each command."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """`crosscheck modes` runs each engine in a process of its own."""
 
-from __future__ import annotations
-
 import json
 
 from crosscheck.cli import main

@@ -1,7 +1,5 @@
 """Examples and the notebook run with the packages of README's first command; their numbers are right."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

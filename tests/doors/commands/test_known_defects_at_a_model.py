@@ -1,7 +1,5 @@
 """Known defects of engines at a user's mechanism: said where short runs show them, and nowhere else."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Numbers beyond the ends of an option are refused before anything is built, with the largest value."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

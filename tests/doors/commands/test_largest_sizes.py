@@ -1,7 +1,5 @@
 """Sizes of scenes and runs that no machine has are refused before anything is built."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

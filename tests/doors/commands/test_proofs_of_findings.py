@@ -1,7 +1,5 @@
 """Scripts that prove findings: their number counts, and none outlives the command that runs it."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

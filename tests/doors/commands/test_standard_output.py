@@ -1,7 +1,5 @@
 """Standard output that cannot be written, and control characters, which would act on a terminal."""
 
-from __future__ import annotations
-
 import os
 from contextlib import redirect_stdout, suppress
 

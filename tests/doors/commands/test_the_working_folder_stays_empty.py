@@ -1,7 +1,5 @@
 """Commands leave the working folder empty: no logs of engines, no folders of their solvers."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

@@ -1,7 +1,5 @@
 """Two versions of an engine's package: changes beyond noise, the release that made them, and refusals."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Drivers that come to a dead position: its time in closed form, and a comparison that ends before it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Openings of joints: a gap is a distance of points, and angles do not depend on the size."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A run without samples is a result: it has no metrics, and commands report its outcome."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Conformance suite: engines of order 1 and 2 conform with right equations, and fail with wrong ones."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

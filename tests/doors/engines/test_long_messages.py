@@ -1,7 +1,5 @@
 """A record keeps the beginning of an engine's long text, and its length."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Fixtures of tests of files."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.helpers.imports import Files

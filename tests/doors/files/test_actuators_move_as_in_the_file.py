@@ -1,7 +1,5 @@
 """Actuators of an MJCF file: joints of the imported scene accelerate as in MuJoCo (qacc)."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Broken, binary, deep and impossible files are refused with a sentence and exit status 2."""
 
-from __future__ import annotations
-
 import pytest
 
 BODY = """<mujoco><worldbody><body name="a">

@@ -1,7 +1,5 @@
 """Damaged records of a report: one sentence that names the file, and exit status 2."""
 
-from __future__ import annotations
-
 import copy
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """MJCF: limits that act at the start, couplings and armature, and loops of any size."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Names of scenes, bodies and joints in file names, commands, pages and pictures."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

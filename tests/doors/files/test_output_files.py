@@ -1,7 +1,5 @@
 """Output files: complete or unchanged, in their folder, and over a file that exists only by --force."""
 
-from __future__ import annotations
-
 import resource
 import signal
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Packed records of a report, and compressed files of records: read as the files are; damage is named."""
 
-from __future__ import annotations
-
 import lzma
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """SDF files mean what their format says: frames of equal names, threads, mimic joints, limits, inertias."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """URDF: elements that close loops, elements that are not read, and impossible inertias."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

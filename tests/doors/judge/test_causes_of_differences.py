@@ -1,7 +1,5 @@
 """The cause of a difference is named: a change of the exact motion's table, or of its scene."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 

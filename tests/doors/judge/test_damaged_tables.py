@@ -1,7 +1,5 @@
 """Damaged tables of a rod that turns by 16 t rad are off, or refused with one sentence and exit status 2."""
 
-from __future__ import annotations
-
 import codecs
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Large random mechanisms: their start, the judge's accelerations on them, and their reduction."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

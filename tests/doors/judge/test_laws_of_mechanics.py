@@ -1,7 +1,5 @@
 """Laws of mechanics that motions, loads, reactions and drivers of the judge obey at 0.43 of the duration."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

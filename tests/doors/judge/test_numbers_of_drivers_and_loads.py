@@ -1,7 +1,5 @@
 """Columns of drivers, loads and energies in references, by closed forms and by the balance of power."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

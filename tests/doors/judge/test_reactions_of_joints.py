@@ -1,7 +1,5 @@
 """Reactions of joints in a table are judged by the motion, as far as the constraints determine them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

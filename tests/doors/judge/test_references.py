@@ -1,7 +1,5 @@
 """References of short motions: stored states, closed forms, and invariance under units, frames and order."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Relations of the conformance suite hold for whole motions by the judge of the changed mechanisms."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Motions with a planted fault: the judge measures the size of the fault and names the quantity."""
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Mapping

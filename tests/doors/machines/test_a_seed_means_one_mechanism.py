@@ -5,8 +5,6 @@ checksum of its words, and two sums of its numbers with fixed weights. Where mec
 anew by ``python -m tests.doors.machines.test_a_seed_means_one_mechanism``, and then all stored verdicts, too.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

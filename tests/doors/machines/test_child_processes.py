@@ -1,7 +1,5 @@
 """Child processes: one that was killed while it waited is replaced, and none outlives its parent."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Compiled kernels on disk: none is loaded from a folder that others can write, nor from a damaged file."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

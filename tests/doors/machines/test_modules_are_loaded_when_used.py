@@ -1,7 +1,5 @@
 """Modules of a run that only some methods need."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Bushings: damped springs whose ends coincide at the start, by the equations of a slide and of a hinge."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

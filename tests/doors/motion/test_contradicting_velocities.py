@@ -1,7 +1,5 @@
 """Velocities given to bodies that a joint forbids are refused; the error names the joint and the amount."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

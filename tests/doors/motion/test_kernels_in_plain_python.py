@@ -3,8 +3,6 @@
 Plain Python also refuses an index beyond an array, which compiled code does not notice.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Facts of mechanisms of many bodies that must not depend on how they are found."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Slides that become many times longer than the mechanism was are no singular positions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Every formulation, stabilisation and integrator has the judge's stored states, as far as it claims."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

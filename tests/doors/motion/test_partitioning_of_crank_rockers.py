@@ -1,7 +1,5 @@
 """Coordinate partitioning follows crank-rockers in fixed steps, also from near a singular position."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

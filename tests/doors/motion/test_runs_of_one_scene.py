@@ -1,7 +1,5 @@
 """Runs of one scene object give equal results, whatever ran before; a changed copy is another scene."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np

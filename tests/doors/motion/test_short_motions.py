@@ -1,7 +1,5 @@
 """Short motions of every joint, load, driver and coupling: `taylor` has the judge's stored states."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

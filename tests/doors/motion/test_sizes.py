@@ -1,7 +1,5 @@
 """Outcome, message and motion of a run do not depend on the size of the mechanism."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

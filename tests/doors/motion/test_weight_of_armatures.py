@@ -1,7 +1,5 @@
 """Reflected inertia resists acceleration and has no weight, in every method, in batches and in equilibria."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 
 import numba

@@ -1,7 +1,5 @@
 """The true error is at most ten error estimates: an estimate is at least the error by rounding."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -88,6 +86,7 @@ def errors_over_estimates(make, rate: float, method: str | None, rtol: float) ->
 
 @pytest.mark.parametrize("make", MAKERS)
 def test_true_error_is_at_most_ten_estimates(make):
+    """The closed form of each motion has the error. An estimate is an order of size: ten is its promise."""
     assert errors_over_estimates(make, 3.3, None, 1e-12).max() <= 10
 
 
@@ -96,12 +95,14 @@ def test_true_error_is_at_most_ten_estimates(make):
 @pytest.mark.parametrize("rate", [0.07, 1.0, 19.0, 410.0])
 @pytest.mark.parametrize("make", MAKERS)
 def test_true_error_of_many_motions_is_at_most_ten_estimates(make, rate, rtol):
+    """Rates are speeds in rad/s or m/s, or a distance from the origin in m."""
     assert errors_over_estimates(make, rate, "taylor", rtol).max() <= 10
 
 
 @pytest.mark.parametrize("make", [resting, spinning])
 def test_estimate_of_a_motion_without_error_is_its_rounding_and_not_zero(make):
-    """Both runs of the estimate are equal; a number is stored to 2⁻⁵³ of its size."""
+    """The two runs that the estimate compares are equal. A number is stored to 2⁻⁵³ of its size, and a few
+    hundred roundings, below 1e-13, are the estimate."""
     scene, _ = make(1.0)
     largest = mbref.with_error_estimate(mbref.simulate(scene, times=TIMES)).error_estimate.largest
     assert 2.0**-53 < largest < 1e-13

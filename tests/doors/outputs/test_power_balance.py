@@ -1,7 +1,5 @@
 """Work of drivers and loads is the change of energy, of random mechanisms and by their outputs alone."""
 
-from __future__ import annotations
-
 import csv
 
 import numpy as np
@@ -13,7 +11,7 @@ from mbref import Limits, Motion, Scene, simulate
 from tests.helpers.power_balance import panel_times, unbalanced
 from tests.helpers.powered_mechanisms import powered_mechanism
 
-BALANCED = 1e-9  # difference / largest power
+BALANCED = 1e-9  # imbalance / largest power: error of the quadrature over three panels
 PANELS = 3
 GATE = range(11)
 # mechanisms of a slow test, and how many of them may be refused, or move too fast for the samples
@@ -37,7 +35,7 @@ def off(motion: Motion) -> float:
 
 @pytest.mark.parametrize("seed", GATE)
 def test_work_of_drivers_and_loads_is_the_change_of_energy(seed):
-    """Gauss–Legendre quadrature of the power over three panels; differences over the largest power."""
+    """E(t) - E(0) = ∫ Σ P dt, by Gauss–Legendre quadrature over three panels of the run's own columns."""
     motion = run(powered_mechanism(seed))
     assert motion.outcome.name == "COMPLETED", motion.message
     assert off(motion) < BALANCED
@@ -46,6 +44,7 @@ def test_work_of_drivers_and_loads_is_the_change_of_energy(seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(100, 340, MANY))
 def test_work_is_the_change_of_energy_of_many_mechanisms(first):
+    """At most 3 of 20 may have no sample: a scene that is refused, or motions too fast for the panels."""
     found = {seed: off(run(powered_mechanism(seed))) for seed in range(first, first + MANY)}
     moved = {seed: imbalance for seed, imbalance in found.items() if not np.isnan(imbalance)}
     assert len(moved) >= MANY - WITHOUT_BALANCE, f"balances from {first} on for {list(moved)} only"
@@ -54,6 +53,8 @@ def test_work_is_the_change_of_energy_of_many_mechanisms(first):
 
 @pytest.mark.parametrize("seed", GATE[:10])
 def test_accelerations_at_the_start_obey_gauss_principle_of_the_judge(seed):
+    """The judge minimises the constraint by singular values; the difference is relative to the largest
+    acceleration, with a condition of up to 1e5."""
     scene = powered_mechanism(seed)
     exact = gauss(scene)
     motion = simulate(scene, times=[0.0, 1e-6])
@@ -63,6 +64,7 @@ def test_accelerations_at_the_start_obey_gauss_principle_of_the_judge(seed):
 @pytest.mark.parametrize("method", ["alf-dual+projection", "mpi-qr+partitioning", "alf-dual+baumgarte/adams"])
 @pytest.mark.parametrize("seed", PLAIN[:2])
 def test_other_methods_balance_work_and_energy(seed, method):
+    """E(t) - E(0) = ∫ Σ P dt for sparse matrices, partitioning, and Adams's method with feedback."""
     motion = run(powered_mechanism(seed), method, 1e-12)
     assert motion.outcome.name == "COMPLETED", motion.message
     assert off(motion) < BALANCED
@@ -70,6 +72,7 @@ def test_other_methods_balance_work_and_energy(seed, method):
 
 @pytest.mark.parametrize("seed", PLAIN)
 def test_kinetic_energy_equals_the_judges_of_the_same_states(seed):
+    """Σ (m v² + ω J ω) / 2, armatures included, to 5000 roundings."""
     motion = run(powered_mechanism(seed))
     assert motion.outcome.name == "COMPLETED", motion.message
     states = motion.position, motion.orientation, motion.velocity, motion.angular_velocity
@@ -78,6 +81,7 @@ def test_kinetic_energy_equals_the_judges_of_the_same_states(seed):
 
 
 def test_powers_in_a_run_file_and_in_a_table_balance_the_energy(tmp_path):
+    """E(t) - E(0) = ∫ Σ P dt by the columns of a mechanism with several drivers, as read back from files."""
     motion = run(powered_mechanism(11))
     assert motion.outcome.name == "COMPLETED" and len(motion.mechanism.driver) > 1
     motion.save(tmp_path / "run.json")

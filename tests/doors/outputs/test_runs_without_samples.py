@@ -1,7 +1,5 @@
 """Runs that reach no sample: their outcome is printed, and their tables and files are empty."""
 
-from __future__ import annotations
-
 import csv
 import json
 
@@ -25,6 +23,7 @@ def stuck() -> Motion:
 @pytest.mark.parametrize("columns", [[], ["--columns", "slider.position", "energy"]])
 @pytest.mark.parametrize("estimate", [pytest.param("auto", marks=pytest.mark.slow), "no"])
 def test_run_that_reaches_no_sample_prints_its_outcome_and_cause(columns, estimate, capsys):
+    """Redundant rows make the leading matrix of lm1 singular at the start."""
     assert main(["run", *STUCK, *columns, "--estimate", estimate]) == 1
     said = capsys.readouterr().out
     assert "SINGULAR_MATRIX at t = 0 s" in said and "the leading matrix is singular" in said
@@ -58,6 +57,7 @@ def test_plot_of_a_run_without_samples_is_empty_and_its_animation_is_refused(tmp
 
 
 def test_every_array_of_a_motion_without_samples_is_empty(stuck, tmp_path):
+    """Its table has the line of headers alone."""
     stuck.to_csv(tmp_path / "m.csv")
     assert (tmp_path / "m.csv").read_text().count("\n") == 1
     columns = stuck.columns()

@@ -1,7 +1,5 @@
 """Steady motions of mechanisms with motors: reflected inertia changes vibrations, not the motion."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

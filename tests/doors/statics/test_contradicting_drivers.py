@@ -1,7 +1,5 @@
 """Two drivers of one freedom are named if their motions differ, and move it if they agree."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,7 @@ from tests.helpers.dead_positions import pushed, turned
 from tests.helpers.statics import parallelogram, rod, slide
 
 TIMES = np.array([0.5, 1.0])  # s, of scenes in a batch
-COMMANDS = {"run": 2, "diagnose": 0, "equilibrium": 2}  # and their exit status
+COMMANDS = {"run": 2, "diagnose": 0, "equilibrium": 2}  # and their exit status; diagnose only reports
 
 
 def twice_driven(first, second) -> Scene:
@@ -84,7 +82,8 @@ def test_single_driver_at_a_dead_position_is_no_contradiction_of_drivers(made):
 @pytest.mark.parametrize("share", [1e-4, 1e-7])
 @pytest.mark.parametrize("frequency", [1.0, 16 * np.pi])
 def test_contradicting_drivers_of_any_scene_of_an_ensemble_are_named(share, frequency):
-    """The other scenes have drivers that agree; the differing one may be equal at many times."""
+    """Three scenes have drivers that agree, and move by 0.5 t. In the fourth one of the drivers adds a sine,
+    which is zero at the samples of 0.5 s and 1 s for the frequency 16 π rad/s."""
 
     def scene(amplitude: float) -> Scene:
         motions = [

@@ -1,7 +1,5 @@
 """Diagnosis of mechanisms: counts that the judge finds, at every size, and links that spin idly."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -43,6 +41,8 @@ def ball_linkage(ends: tuple[str, str] = ("spherical", "spherical")) -> Scene:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_rows_redundancy_and_freedoms_are_those_that_the_judge_finds_at_every_size(seed):
+    """The judge's `mobility` finds ranks by singular values. In other units of length the whole diagnosis is
+    equal."""
     scene = random_mechanism(seed)
     truth, expected = mobility(scene), diagnosis_of(scene)
     counts = expected[0]
@@ -64,6 +64,7 @@ def test_rows_redundancy_and_freedoms_of_many_mechanisms_are_those_that_the_judg
 
 @pytest.mark.parametrize("name", ["planar_slider_crank", "bennett", "sarrus", "four_bar_chain"])
 def test_smallest_singular_value_of_built_in_scenes_does_not_depend_on_size(name):
+    """It is a number without unit, of rows relative to the mechanism's length."""
     scene = find_scene(name)
     values = diagnose(scene).smallest_singular_value
     for size in SIZES:
@@ -127,5 +128,6 @@ def test_no_idle_freedom_is_named_where_no_rod_spins(scene, tmp_path, capsys):
 
 
 def test_smallest_singular_values_of_mirrored_linkages_are_equal():
+    """The parallelogram stands above or below the line of its pivots."""
     first, second = (diagnose(parallelogram(y, 0.6)).smallest_singular_value for y in (0.8, -0.8))
     assert first == pytest.approx(second, rel=1e-12)

@@ -1,7 +1,5 @@
 """Equilibria of mechanisms that are singular, marginal, stiff, or wound by many turns, by closed forms."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -34,7 +32,8 @@ def with_slide(stiffness: float, damping: float, mass: float) -> Scene:
 
 
 def test_flat_parallelogram_is_an_equilibrium_at_a_singular_position_and_has_no_modes(tmp_path, capsys):
-    """Gravity acts along the line of all links."""
+    """Gravity acts along the line of all links, so that they rest. `equilibrium` reports it; `modes`, which
+    needs equations of motion there, refuses it."""
     flat = parallelogram(0.0, 1.0).with_(gravity=(G, 0.0, 0.0))
     found = equilibria(flat, starts=2)
     assert found[0].stability == "singular" and len(found[0].eigenvalues) == 0
@@ -70,6 +69,7 @@ def test_inverted_pendulum_is_stable_or_unstable_by_a_millionth_of_its_critical_
     """Eigenvalues s² = -(k - m g l) / I with k = m g l (1 + share)."""
     each = equilibria(pendulum((0.0, ARM, 0.0), load=[spring(TORQUE * (1 + share))]), starts=1)[0]
     assert each.stability == ("stable" if share > 0 else "unstable")
+    # k - m g l is a difference of a millionth: rounding of 1e-12 is relative to it 1e-6, with a margin of 100
     assert np.allclose(each.eigenvalues**2, -share * TORQUE / ABOUT_HINGE, rtol=1e-4)
 
 
@@ -130,8 +130,8 @@ def test_rod_on_a_stiff_slide_along_a_pendulum_is_found_hanging():
     assert np.allclose(found.scene.body[2].position, (0.0, -depth - 0.5, 0.0), rtol=0.0, atol=1e-9)
 
 
-def test_pendulum_without_spring_has_two_equilibria_whatever_turns_lead_to_them():
-    """A hinge without spring that has made a full turn has its old pose; starts reach it both ways."""
+def test_pendulum_without_spring_has_one_stable_and_one_unstable_equilibrium():
+    """It hangs or stands. Searches also arrive after full turns, whose poses are the same equilibria."""
     for angle in (0.3, 2.0):
         place = (ARM * np.sin(angle), ARM * np.cos(angle), 0.0)
         found = equilibria(pendulum(place))
@@ -175,7 +175,9 @@ def test_spring_wound_by_many_turns_unwinds_to_the_equilibrium_near_its_natural_
     ],
 )
 def test_all_windings_of_a_soft_spring_have_their_equilibria(share, natural, starts, count):
-    """Each balances k (φ₀ - φ) = m g l cos φ with another twist φ₀ - φ; near k = m g l three are close."""
+    """Each balances k (φ₀ - φ) = m g l cos φ, with k = share · m g l and φ₀ = natural. A table of 20001
+    angles shows the changes of sign: their number is ``count``, and the table's step the error of the twists
+    φ₀ - φ."""
     stiffness = share * TORQUE
     angles = natural + np.linspace(-1.01, 1.01, 20001) / share
     off = stiffness * (natural - angles) - TORQUE * np.cos(angles)

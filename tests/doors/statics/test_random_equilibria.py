@@ -1,7 +1,5 @@
 """Equilibria of random mechanisms, against accelerations and eigenvalues of the judge's own equations."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -56,6 +54,7 @@ def judged(scene: Scene, starts: int) -> list[Judged]:
 
 @pytest.mark.parametrize("seed", [0, 3])
 def test_eigenvalues_agree_with_the_judges_within_their_bounds(seed):
+    """Eigenvalues of the judge's own linearised equations; at the equilibrium accelerations vanish."""
     (found,) = judged(at_rest(seed), starts=1)
     assert found.acceleration < BALANCED and found.eigenvalues <= 1
 
@@ -85,9 +84,10 @@ def test_eigenvalues_of_many_mechanisms_agree_with_the_judges_within_their_bound
     ],
     ids=["linkage", "sprung"],
 )
-def test_equilibria_in_other_units_have_equal_places_and_eigenvalues_by_the_unit_of_time(
+def test_equilibria_in_other_units_have_proportional_places_and_eigenvalues_by_the_unit_of_time(
     scene, length, mass, time
 ):
+    """Eigenvalues (1/s) times the unit of time agree within the bounds of both, places to 1e-9 m."""
     found = equilibria(scene, 3)
     assert found
     for each, other in zip(
