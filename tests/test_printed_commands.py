@@ -65,8 +65,7 @@ OTHERS = [
 
 @pytest.mark.parametrize("page", ["README.md", *map(slow, OTHERS)])
 def test_printed_commands_of_mbref_end_with_status_0(page, tmp_path):
-    """They run in the order of the page, in one folder that has my.toml; test_transcripts.py compares
-    outputs."""
+    """In the page's order, in one folder that has my.toml; test_transcripts.py compares outputs."""
     if page in OWN:
         SCENES[OWN[page]]().save(tmp_path / "my.toml")
     elif page != "README.md":

@@ -1,5 +1,4 @@
-"""Random mechanisms whose joints make many turns: torsion springs of natural angles of many turns, gears and
-torques over time."""
+"""Random mechanisms of many turns: torsion springs of large natural angles, gears, torques over time."""
 
 import numpy as np
 

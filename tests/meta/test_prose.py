@@ -36,6 +36,5 @@ def test_page_begins_with_a_sentence_and_shows_code_or_a_picture_in_30_lines(pat
     ],
 )
 def test_faults_of_prose_are_found_with_their_lines(text, lines):
-    """Private words, sentences of more than 36 words, and faults by proselint; code and names are left
-    out."""
+    """Private words, sentences of more than 36 words, faults by proselint; code is left out."""
     assert [line for line, _ in prose.faults(text)] == lines

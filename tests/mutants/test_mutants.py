@@ -44,8 +44,7 @@ def test_every_mutant_differs_from_its_source_and_compiles():
 
 
 def test_random_mutants_depend_on_the_seed_alone():
-    """Two draws of 20 by the seed 1 are equal, a draw by the seed 2 differs, all from the folder asked
-    for."""
+    """Two draws of 20 by seed 1 are equal, by seed 2 they differ; all are from the folder asked for."""
     first, again, other = (drawn(ROOT, seed, 20, ["mbref/motions/drawing"]) for seed in (1, 1, 2))
     assert first == again and len(set(first)) == 20 and set(first) != set(other)
     assert all(mutant.file.startswith("mbref/motions/drawing/") for mutant in first)

@@ -38,8 +38,7 @@ def test_every_scene_has_its_four_figures():
     "name", [f"spatial_slider_crank-{k}" for k in ("mechanism", "speed", "violation", "energy")]
 )
 def test_figure_is_not_blank_and_reproducible(name):
-    """Drawn twice it is the same SVG. A blank picture has no ten paths, and not 60 different rows of
-    pixels."""
+    """Drawn twice it is one SVG. Blank pictures have neither ten paths nor 60 different rows of pixels."""
     picture = pictures()[name]
     once, again = figures.svg(picture.draw(), name), figures.svg(picture.draw(), name)
     assert once == again, f"{name} changes from one drawing to the next"

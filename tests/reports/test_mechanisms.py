@@ -71,8 +71,7 @@ def test_frames_of_a_planar_crank_are_less_than_two_turn_steps_apart():
 
 
 def test_branches_share_one_view_and_mark_the_crossing():
-    """Both motions are drawn in the first one's view, one to half of its time, with a mark at the fourth
-    sample."""
+    """Both are drawn in the first one's view, one to half of its time; the fourth sample is marked."""
     crank = scene("planar_slider_crank")
     true = exact(crank)
     other = exact(crank, share=0.5)

@@ -217,8 +217,7 @@ def test_exact_crank_record_follows_the_true_branch(records):
 
 
 def test_digits_of_exact_accelerations_are_all_and_of_a_run_that_failed_at_its_start_unknown(records):
-    """Errors of the records, made from exact motions, are below 50 roundings; without a sample they are
-    NaN."""
+    """Errors of records of exact motions are below 50 roundings; without a sample they are NaN."""
     for name, errors in paper_methods.digit_errors(records).items():
         assert max(errors) < 1e-14, (name, errors)
     missing = Label("digits", "alf", "100")

@@ -131,8 +131,7 @@ def test_published_problem_accepts_a_run_by_its_own_measure():
 
 
 def test_best_run_may_end_within_rounding_of_the_end_of_the_motion():
-    """The better run, with an error of 1e-5, ends 1e-10 s before the motion of 0.02 s, and counts as
-    completed."""
+    """The better run, off by 1e-5, ends 1e-10 s before 0.02 s, and counts as completed."""
     ends = [
         record("a", "x", 1e-3, 0.1, step=1.0),
         {**record("a", "x", 1e-5, 0.1, step=0.1), "t_end": 0.0199999999},

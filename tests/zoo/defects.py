@@ -1,5 +1,4 @@
-"""Planted defects of one line, applied one at a time to the example engine, with the check that detects
-each."""
+"""Planted defects of one line in the example engine, one at a time, and the check that detects each."""
 
 import tomllib
 import types

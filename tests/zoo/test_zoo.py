@@ -1,5 +1,4 @@
-"""Every planted defect fails the named check, every check has a defect, and the sound engine passes all
-checks."""
+"""Every planted defect fails its check, every check has a defect, and the sound engine passes all."""
 
 import functools
 import tomllib

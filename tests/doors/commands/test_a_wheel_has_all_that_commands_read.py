@@ -104,8 +104,7 @@ def names(place: Path) -> list[str]:
 
 @pytest.mark.slow
 def test_a_wheel_has_two_packages_and_every_file_of_data(built):
-    """Every file in mbref and crosscheck of the checkout, and modules and templates of reports as
-    crosscheck/reports."""
+    """Every file in mbref and crosscheck, and modules and templates of reports as crosscheck/reports."""
     files = names(built)
     assert {name.partition("/")[0] for name in files if ".dist-info" not in name} == {"mbref", "crosscheck"}
     needed = {name for folder in ("mbref", "crosscheck") for name in of_folder(folder)}

@@ -142,7 +142,6 @@ print(run.outcome.name, run.position[-1, 0, 1])
 
 @pytest.mark.parametrize("name", ["tiny_engine", "spatial_engine"])
 def test_example_engine_runs_a_free_fall_without_any_further_package(name, python, tmp_path):
-    """The ball falls by g t² / 2 = 4.905 m in a second; both integrate parabolas exactly, except for
-    rounding."""
+    """The ball falls by g t² / 2 in a second; both integrate parabolas exactly, except for rounding."""
     outcome, height = output(python, tmp_path, "-c", FALL, EXAMPLES / name, name).split()
     assert outcome == "COMPLETED" and float(height) == pytest.approx(-9.81 / 2, rel=1e-9)

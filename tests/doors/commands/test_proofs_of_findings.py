@@ -33,8 +33,7 @@ PATIENCE = 60.0  # s of waiting, on a loaded machine
     ids=["above the limit", "below it", "not a number"],
 )
 def test_engine_has_the_error_if_the_last_number_of_its_proof_exceeds_the_limit(script: str, status: Status):
-    """The limit is 1: the error is present if the last printed number is larger or NaN, otherwise it is
-    gone."""
+    """The limit is 1. The error is present if the last printed number is larger or NaN, otherwise gone."""
     assert Finding(**TEXTS, package="numpy", script=script, wrong_above=1.0).recheck().status is status
 
 

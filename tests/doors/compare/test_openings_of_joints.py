@@ -39,8 +39,7 @@ def test_opening_has_the_distance_of_the_joints_points_and_the_tilt_of_its_axis(
 
 
 def test_coupling_that_is_off_by_an_angle_opens_by_that_angle_and_by_no_distance():
-    """A geared arm is turned by 0.3 rad about its hinge, which stays closed; arms of 2 m round by 10
-    units."""
+    """A geared arm is turned by 0.3 rad about its hinge; arms of 2 m round by up to ten units."""
     scene = arms(2.0, coupled=True)
     found = opening(scene, standing(scene, np.zeros(3), np.array([0.0, 0.0, 0.3])))
     assert found.gap < 10 * np.finfo(float).eps * 2.0 and found.angle == pytest.approx(0.3, rel=1e-9)

@@ -139,8 +139,7 @@ def test_an_actuator_that_a_scene_cannot_have_is_refused_or_left_out_on_request(
 
 
 def test_controls_and_forces_of_motors_are_clipped_as_in_mujoco(files):
-    """The ranges are of a control, of an actuator's force and of a joint's force; MuJoCo's qacc is the
-    truth."""
+    """Ranges of a control, an actuator's force and a joint's force; MuJoCo's qacc is the truth."""
     parts = [
         "<motor joint='JOINT' ctrlrange='-1 1' ctrllimited='true' gear='2'/>",
         "<motor joint='JOINT' forcerange='-0.5 0.5' gear='2'/>",

@@ -119,8 +119,7 @@ def test_page_and_markdown_of_a_report_show_a_name_without_acting_on_its_markup(
 
 @pytest.mark.parametrize("name", NAMES)
 def test_printed_commands_of_a_report_name_the_scene_file_as_one_word(name):
-    """`shlex.split` reads the commands as a shell does: of a run's card, of the report, and for another
-    path."""
+    """`shlex.split` reads commands as a shell does: of a run's card, of the report, for another path."""
     scene = synthetic.scene().with_(name=name)
     group = SceneRuns(scene, [Run(synthetic.record("mbref", "default", 1e-9, 0.1, a_scene=scene))])
     blocks = [*sections.records.render([group]), *sections.provenance.render([group])]

@@ -35,8 +35,7 @@ def sdf(*parts: str, version: str = "1.6") -> str:
 
 @pytest.mark.parametrize("name", ["world", "arm", "hand", "__model__"])
 def test_a_joint_without_a_pose_is_at_its_child_link_whatever_its_name(files, name):
-    """The format has this default pose. "world" and "__model__" are also names of frames, "arm" and "hand" of
-    links."""
+    """The format's default pose. "world" and "__model__" also name frames, "arm" and "hand" links."""
     text = sdf(
         link("arm", "0.5 0 0 0 0 0"),
         link("hand", "0.9 0.2 0 0 0 0"),
@@ -89,8 +88,7 @@ def test_joints_of_a_mimic_with_an_offset_start_at_angles_that_obey_it(files):
     ("ratio", "reference", "offset"), [(3, 0.1, 0.3), (0.1, 0.7, 0.07), (-1.1, 1.1, -1.21)]
 )
 def test_an_offset_of_a_mimic_joint_that_is_only_rounding_is_exactly_zero(files, ratio, reference, offset):
-    """The coupling's offset is offset - ratio · reference, here zero except for rounding of binary
-    numbers."""
+    """The coupling's offset is offset - ratio · reference, here only rounding of binary numbers."""
     mimic = mimics("a", ratio, offset, reference)
     text = sdf(
         link("p"),

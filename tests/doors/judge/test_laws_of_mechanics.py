@@ -74,8 +74,7 @@ def test_positions_velocities_and_accelerations_obey_the_joints_to_rounding(name
 
 @pytest.mark.parametrize("name", ALL)
 def test_velocities_and_accelerations_are_differences_of_neighbouring_poses_and_velocities(name):
-    """The difference of fourth order over 4e-4 of the duration has a relative error of 1e-8; the limit has a
-    margin of ten."""
+    """Differences of fourth order over 4e-4 of the duration are exact to 1e-8; the margin is ten."""
     _, run = at_one_moment(name)
     relative = rotations.multiply(run.orientation, rotations.conjugate(run.orientation[2]))
     turned = 2 * relative[..., 1:] * np.sign(relative[..., :1])  # rad, of small rotations

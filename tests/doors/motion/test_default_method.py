@@ -51,8 +51,7 @@ def test_default_crosses_the_singular_position_of_14_loops_as_their_closed_form(
 
 @pytest.mark.parametrize("name", ["sarrus_stack[12]", "sarrus_stack[30]", "four_bar_chain[41]"])
 def test_sparse_matrices_and_taylor_series_move_large_mechanisms_alike(name):
-    """The methods share neither equations nor integrator; their positions (m) differ by at most ten
-    tolerances, 1e-8 each."""
+    """The methods share neither equations nor integrator; positions (m) agree to ten tolerances of 1e-8."""
     scene, times = find_scene(name), [0.0, 0.05]
     runs = [simulate(scene, method, times, Limits(rtol=1e-8)) for method in ("alf-dual+projection", "taylor")]
     assert [run.outcome.name for run in runs] == ["COMPLETED"] * 2, [run.message for run in runs]

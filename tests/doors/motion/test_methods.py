@@ -71,8 +71,7 @@ def test_formulation_that_claims_it_has_the_judges_states_with_redundant_rows(fo
 @pytest.mark.parametrize("name", REDUNDANT)
 @pytest.mark.parametrize("formulation", [n for n in GENERAL if not FORMULATIONS[n].handles_redundancy])
 def test_formulation_without_the_claim_ends_at_the_start_with_the_number_of_redundant_rows(formulation, name):
-    """The leading matrix is singular: the run has no sample, and the message says which rows are the
-    cause."""
+    """The leading matrix is singular: the run has no sample, and its message names the cause."""
     scene = MOTIONS[name]()
     run = mbref.simulate(scene, f"{formulation}+projection", times=times_of(scene))
     redundant = mbref.counts(scene).redundant
@@ -142,8 +141,7 @@ def test_baumgartes_feedback_keeps_constraint_violations_small_that_grow_without
 
 @pytest.mark.parametrize("name", ["gears with armature", "arm with universal"])
 def test_projection_keeps_joints_closed_to_rounding(name):
-    """Violations over the mechanism's length, in 2 ms steps of order four; of velocities, 100 times as
-    much."""
+    """Violations over the mechanism's length, in 2 ms steps; of velocities 100 times as much."""
     rounding = 1e-13  # 500 units
     _, _, run = errors(name, "lm2+projection/rk4[step=2e-3]")
     assert run.violation.position.max() < rounding

@@ -79,8 +79,7 @@ def test_angle_of_a_wheel_on_a_spring_counts_full_turns_from_the_start(method, t
 
 @pytest.mark.parametrize("seed", range(8))
 def test_outputs_of_random_mechanisms_are_equal_for_other_samples(seed):
-    """Angles, torques and energies at a time are, to rounding, those of 601 samples, if few or one are
-    asked."""
+    """Of few samples, or one, outputs at a time equal outputs of 601 samples to rounding."""
     dense = mbref.simulate(spinning_mechanism(seed), "taylor", TIMES)
     assert dense.outcome is mbref.Outcome.COMPLETED, dense.message
     assert differences(dense, "taylor", np.random.default_rng(seed)) < ROUNDING
@@ -109,8 +108,7 @@ def test_angle_at_the_end_alone_is_the_angle_that_dense_samples_show(seed):
 
 
 def test_run_file_table_and_json_have_the_angle_with_its_full_turns(tmp_path, capsys):
-    """φ = 40 (1 - cos 2 t) rad at 3 s, to the relative 1e-6 of `approx`; the file has the angle to the
-    bit."""
+    """φ = 40 (1 - cos 2 t) rad at 3 s, to a relative 1e-6; the file has the angle to the bit."""
     scene, path = wound_wheel(), tmp_path / "wound.toml"
     scene.save(path)
     expected = NATURAL * (1.0 - math.cos(2.0 * END))

@@ -41,8 +41,7 @@ def ball_linkage(ends: tuple[str, str] = ("spherical", "spherical")) -> Scene:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_rows_redundancy_and_freedoms_are_those_that_the_judge_finds_at_every_size(seed):
-    """The judge's `mobility` finds ranks by singular values. In other units of length the whole diagnosis is
-    equal."""
+    """The judge's `mobility` finds ranks by singular values. In other units the diagnosis is equal."""
     scene = random_mechanism(seed)
     truth, expected = mobility(scene), diagnosis_of(scene)
     counts = expected[0]

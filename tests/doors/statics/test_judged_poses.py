@@ -42,8 +42,7 @@ def test_pendulum_that_its_spring_just_holds_is_one_indifferent_equilibrium():
 
 
 def test_flat_parallelogram_at_a_singular_position_is_left_out_and_a_hanging_one_is_found():
-    """Gravity acts along the flat links, or down. At a singular position there are no small motions to
-    judge."""
+    """Gravity acts along the flat links, or down. A singular position has no small motions to judge."""
     assert [each.stability for each in steady_poses(parallelogram(-0.96, 0.28), starts=1)] == ["stable"]
     assert not steady_poses(parallelogram(0.0, 1.0).with_(gravity=(G, 0.0, 0.0)), starts=1)
 
