@@ -41,6 +41,7 @@ def test_contents_of_the_site_name_every_page_once():
 
 @pytest.mark.parametrize("name", METHODS)
 def test_page_of_a_method_has_equations_use_limits_and_measurements(name):
+    """A formula in $$, the paragraphs "Use it for" and "It fails on", and the section "Measured"."""
     text = MADE.get(f"methods/{name}.md") or (DOCS / "methods" / f"{name}.md").read_text()
     assert text.startswith(f"# `{name}`: ") and "$$" in text
     assert "**Use it for**: " in text and "**It fails on**: " in text and "## Measured" in text
@@ -97,6 +98,7 @@ def test_site_draws_every_load_that_the_page_of_the_scene_format_shows():
 
 
 def test_page_of_robustness_names_only_existing_tests():
+    """It names more than 30 tests as proofs of its rows."""
     sources = "".join(path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
     named = set(re.findall(r"`(test_\w+)`", (DOCS / "robustness.md").read_text()))
     assert len(named) > 30

@@ -75,6 +75,7 @@ def test_time_series_has_a_cross_where_a_run_ended_early():
 
 
 def test_twelve_curves_of_an_engine_have_one_colour_and_different_lines():
+    """Twelve families of mbref: each has another pair of line style and marker."""
     looks = figures.looks([("mbref", str(i)) for i in range(12)])
     kinds = {(str(look["linestyle"]), look["marker"]) for look in looks.values()}
     assert len(kinds) == 12, kinds

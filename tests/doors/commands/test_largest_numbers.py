@@ -104,6 +104,7 @@ ERRORS = [("tune", "mbref", "four_bar", "--error"), ("judge", "four_bar", "run.c
 @pytest.mark.parametrize("text", ["1e20", "1.1", "inf", "nan", "-1e-3"])
 @pytest.mark.parametrize("command", ERRORS, ids=" ".join)
 def test_error_as_large_as_the_mechanism_is_refused(command, text: str, capsys):
+    """Errors are relative to the mechanism's length: the largest is 1."""
     ends = "from 0 to 1" if command[-1] == "--tolerance" else "positive and at most 1"
     status, said = ended(capsys, *command[:-1], f"{command[-1]}={text}")
     assert status == 2 and f"must be {ends}, got {text}" in said

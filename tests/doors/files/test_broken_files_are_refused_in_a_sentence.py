@@ -126,6 +126,7 @@ def test_a_chain_of_300_links_or_bodies_is_refused_with_its_length(files):
     ],
 )
 def test_a_broken_configuration_of_an_included_model_is_named(files, configuration, says):
+    """A world includes the model arm by its folder, whose model.config names the file of the model."""
     place = files.folder / "arm"
     place.mkdir()
     (place / "model.config").write_bytes(configuration)

@@ -88,6 +88,7 @@ def test_pictures_of_any_name_are_xml_in_the_folder_and_their_legends_show_it(
     "name", ["a\x1b[31m", "line\nbreak", "tab\t", "\x7f", "\u202eback", "nul\x00", "n" * 201, "n " * 2500]
 )
 def test_control_characters_in_names_and_endless_names_are_refused_in_short_messages(name):
+    """A name may have 200 characters. Messages show no control character and have fewer than 200, too."""
     with pytest.raises(SceneError, match=r"must have (no control|at most 200) character") as refused:
         named(name)
     assert max(map(len, refused.value.faults)) < 200

@@ -214,6 +214,7 @@ def test_jacobian_times_velocities_is_the_difference_of_joint_residuals(name):
 
 @pytest.mark.parametrize("name", MOTIONS)
 def test_length_of_a_mechanism_is_in_its_units_and_independent_of_frame_and_order(name):
+    """In units seven times smaller it has seven times the number."""
     scene = MOTIONS[name]()
     length = constraints.scene_length(scene)
     assert constraints.scene_length(in_other_units(scene, 3.0, 7.0, 0.5)) == pytest.approx(7 * length)

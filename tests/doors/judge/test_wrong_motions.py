@@ -93,6 +93,7 @@ def test_measures_of_a_run_are_each_metric_and_bound_and_end_of_the_truth():
 @pytest.mark.parametrize("make", MAKERS)
 @pytest.mark.parametrize("sample", [0, 5, SAMPLES - 1])
 def test_a_shift_is_measured_in_lengths_of_the_mechanism(make, sample):
+    """The last body is shifted by 13 mm at one sample; scd is -log₁₀ of the error, its correct digits."""
     scene, _, exact = exact_of(make)
     found = measured(make, position=changed(exact.position, sample, -1, SHIFT))
     assert found["position_error"] == pytest.approx(SHIFTED / scene_length(scene), rel=1e-9)

@@ -57,12 +57,14 @@ STEPS = 41 * 1e-9  # m: the tolerance of the run for each of 41 bodies
 
 
 def test_long_chain_moves_alike_in_another_order_of_its_parts():
+    """Bodies, joints and loads of 20 four-bars are listed in another order."""
     motion, other = chain_after(), chain_after(in_another_order)
     places = [other.bodies.index(name) for name in motion.bodies]
     assert np.abs(other.position[0, places] - motion.position[0]).max() <= STEPS
 
 
 def test_long_chain_moves_alike_in_a_turned_and_shifted_frame():
+    """Its positions, moved back by SHIFT and TURN_OF_FRAME, are the positions in its own frame."""
     motion, other = chain_after(), chain_after(frame)
     moved_back = (other.position[0] - SHIFT) @ to_matrix(TURN_OF_FRAME)
     assert np.abs(moved_back - motion.position[0]).max() <= STEPS

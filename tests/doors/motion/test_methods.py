@@ -150,6 +150,7 @@ def test_projection_keeps_joints_closed_to_rounding(name):
 
 @pytest.mark.parametrize("formulation", [n for n in GENERAL if FORMULATIONS[n].handles_singular_mass])
 def test_formulation_that_claims_it_has_the_judges_states_with_a_body_without_mass(formulation):
+    """A link without mass is between two slides; the claim is `handles_singular_mass`."""
     assert errors("massless link between slides", f"{formulation}+projection")[0] < limit(formulation)
 
 
