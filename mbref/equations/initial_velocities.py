@@ -20,7 +20,7 @@ START_RANK_TOLERANCE = 1e-5  # smaller singular values stay uncorrected: the ran
 GROSS = 0.05  # violation / scene's length, or violation / given velocities, above which the data are faulty
 # speed / speed that gravity gives over the scene's length, or length / duration, below which a body rests:
 # rounding, also of a program that wrote the file, leaves less
-AT_REST = 1e-12
+NO_MOTION = 1e-12
 # violation by drivers / speed, above which drivers contradict the joints; rounding leaves less
 CONTRADICTED = 1e-3
 # weight of open velocities / weight of given velocities; number of compensating iterations
@@ -48,7 +48,7 @@ class Rates(NamedTuple):
 def speed_at_rest(scene: Scene, length: float) -> float:
     """Return the speed (m/s) up to which bodies of a scene of a length (m) are at rest."""
     falling = np.sqrt(length * np.linalg.norm(scene.gravity))
-    return float(AT_REST * max(falling, length / scene.duration))
+    return float(NO_MOTION * max(falling, length / scene.duration))
 
 
 def given_velocities(bodies: Sequence[Sequence[Body]], q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
