@@ -49,8 +49,28 @@ def _reactions(
 ) -> dict[str, np.ndarray]:
     model = Model(assembled(scene))
     blocks = model.terms(times, q).blocks
+    if model.m <= MOST_OPEN_ROWS and model.once(_is_redundant):
+        multipliers = _of_least_norm(model, blocks, multipliers)
     model.release()
     return reactions(model, q, blocks, multipliers)
+
+
+def _is_redundant(model: Model) -> bool:
+    """Return whether a combination of rows vanishes at the scene's pose."""
+    return vanishing_combinations(model, model.terms(0.0, model.start()).blocks[None])[0].size > 0
+
+
+def _of_least_norm(model: Model, blocks: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+    """Return λ (k, m) without the part along vanishing combinations of rows.
+
+    A run computes this part with a penalty, which magnifies rounding. The norm is of rows of unit length in
+    the metric of projections.
+    """
+    vanishing, lengths = vanishing_combinations(model, blocks)
+    units = row_lengths(model.structure.dense(blocks) * model.data.metric_root)
+    along = (units / lengths)[..., None] * vanishing
+    part = along @ (np.linalg.pinv(along, rcond=OPEN) @ (units * multipliers)[..., None])
+    return np.asarray(multipliers - part[..., 0] / units)
 
 
 def _open_dimensions(scene: Scene, times: np.ndarray, q: np.ndarray) -> dict[str, np.ndarray]:
