@@ -91,12 +91,6 @@ def run_and_reference(name: str) -> tuple[Trajectory, Trajectory]:
     return run, replace(run, **{name: doubles(getattr(motion, name)) for name in names})
 
 
-def test_no_two_published_problems_share_a_scene():
-    """`BY_SCENE` finds a problem by its scene; it has the scenes of the publications in FREEDOMS."""
-    assert len({problem.scene for problem in PUBLISHED.values()}) == len(PUBLISHED)
-    assert set(FREEDOMS) <= set(BY_SCENE)
-
-
 def test_sarrus_platform_stays_level_and_on_its_line():
     """Sarrus' linkage guides its platform along the vertical z, without a tilt, to rounding; the platform
     falls by over 0.1 m in 0.3 s. The motion is the reference's."""

@@ -5,8 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from crosscheck.engine import engine, engine_names
-from crosscheck.engines.mujoco.families import COMPILED
 from mbref.scenes import SCENES
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
@@ -36,12 +34,3 @@ def test_family_that_misses_a_level_by_little_is_named(grids):
     ]
     (sentence,) = grids.misses(rows, (1e-6, 1e-9))
     assert "tuned" in sentence and "1.3e-09 at 500 ms/s" in sentence and "by little" in sentence
-
-
-def test_integrated_families_are_families_of_their_engine():
-    """Families that crosscheck integrates (``integrated_here``) are listed among the engine's; MuJoCo's by
-    name."""
-    named = {name: set(engine(name).integrated_here) for name in engine_names()}
-    assert named["mujoco"] == {"forward", "projected", *COMPILED}
-    for name, families in named.items():
-        assert families <= set(engine(name).families), name

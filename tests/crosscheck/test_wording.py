@@ -24,12 +24,6 @@ def test_error_is_rounded_up_or_called_less_than_the_bound(value, bound, said):
     assert text.at_most(value, bound) == said
 
 
-def test_verbs_and_pronouns_agree_with_the_number():
-    assert [text.runs(n) for n in (0, 1, 2)] == ["0 runs", "1 run", "2 runs"]
-    for names, words in ((["a"], ("is", "its", "agrees")), (["a", "b"], ("are", "their", "agree"))):
-        assert (text.is_or_are(names), text.its_or_their(names), text.agree(names)) == words
-
-
 def test_first_word_loses_its_capital_except_for_names():
     assert text.uncapitalised("Both engines") == "both engines"
     assert text.uncapitalised("MuJoCo is") == "MuJoCo is"
