@@ -1,8 +1,6 @@
-"""Hypothesis profiles: ``check`` is reproducible, ``deep`` searches, ``first`` ends at a failure.
-
-Processes that run all tests share the compilation of kernels. Each computes with one thread: more would wait
-for each other. ``slow.toml`` lists cases with the mark slow.
-"""
+"""Hypothesis profiles: ``check`` is reproducible, ``deep`` searches, ``first`` ends at a failure. Processes
+that run all tests share the compilation of kernels. Each computes with one thread: more would wait for each
+other. ``slow.toml`` lists cases with the mark slow."""
 
 import gc
 import os

@@ -20,10 +20,8 @@ METHODS = (
 
 
 def prepare(backwards: bool = False) -> None:
-    """Compile or load the kernels of METHODS and of the series.
-
-    Processes that begin at the two ends share the work.
-    """
+    """Compile or load the kernels of METHODS and of the series. Processes that begin at the two ends share
+    the work."""
     general = dict.fromkeys(kernel for name in METHODS for kernel in kernels_of(Method.parse(name)))
     kernels = [*general, *KERNELS_OF_SERIES, follow_drivers]
     prepare_all(kernels[::-1] if backwards else kernels)

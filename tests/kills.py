@@ -1,9 +1,7 @@
 """Kills of processes at random moments of a study or an ensemble, and counts of lost and repeated records.
-
 ``python -m tests.kills --runs 200 --times 20`` kills (SIGKILL) the parent of a study, the child processes of
 its engine, and the worker processes of an ensemble, each so many times, and prints a line for each; exit
-status 1 where a record is lost, written twice, or where more runs are lost than processes were killed.
-"""
+status 1 where a record is lost, written twice, or where more runs are lost than processes were killed."""
 
 import argparse
 import json

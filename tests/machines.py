@@ -1,10 +1,8 @@
-"""Tests as other processors would run them: ``python -m tests.machines [TESTS …]``.
-
-A setting chooses the code that OpenBLAS, the kernels' compiler, NumPy and the C library would choose on
-another processor; a table says how many tests pass and fail in each.  ``--setting own`` runs one of them
-alone, and ``--ignore-glob`` is pytest's.  ``--motions`` compares the built-in scenes' motions instead, with
-those of the first setting. Exit status 1 where a test fails, or where motions differ by more than MOST_APART.
-"""
+"""Tests as other processors would run them: ``python -m tests.machines [TESTS …]``. A setting chooses the
+code that OpenBLAS, the kernels' compiler, NumPy and the C library would choose on another processor; a table
+says how many tests pass and fail in each. ``--setting own`` runs one of them alone, and ``--ignore-glob`` is
+pytest's. ``--motions`` compares the built-in scenes' motions instead, with those of the first setting. Exit
+status 1 where a test fails, or where motions differ by more than MOST_APART."""
 
 import argparse
 import json

@@ -1,7 +1,5 @@
-"""All messages of the packages in a row, collected from their code: python -m tests.messages [FOLDER ...]
-
-A message is a text of at least four words that is no docstring, and no part of another text.
-"""
+"""All messages of the packages in a row, collected from their code: python -m tests.messages [FOLDER ...] A
+message is a text of at least four words that is no docstring, and no part of another text."""
 
 import ast
 import re

@@ -1,7 +1,5 @@
-"""Checks of the prose in README, CHANGELOG and docs, by proselint with the rules of prose.toml.
-
-python -m tests.prose [FILE ...]
-"""
+"""Checks of the prose in README, CHANGELOG and docs, by proselint with the rules of prose.toml. python -m
+tests.prose [FILE ...]"""
 
 import re
 import sys

@@ -1,7 +1,5 @@
 """Table of the thresholds of mbref outside ``mbref.taylor.crossing``, from the constants and their comments.
-
-``python -m tests.thresholds docs/results/thresholds.md`` writes the page.
-"""
+``python -m tests.thresholds docs/results/thresholds.md`` writes the page."""
 
 import ast
 import re

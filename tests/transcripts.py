@@ -1,8 +1,6 @@
-"""Commands and Python that README and docs show with their outputs.
-
-Commands stand in blocks named ``console``. Python with an output is followed by OUTPUT and a block of text.
-``python -m tests.transcripts PAGE …`` runs both and writes their outputs into the pages.
-"""
+"""Commands and Python that README and docs show with their outputs. Commands stand in blocks named
+``console``. Python with an output is followed by OUTPUT and a block of text. ``python -m tests.transcripts
+PAGE …`` runs both and writes their outputs into the pages."""
 
 import os
 import re

@@ -1,7 +1,5 @@
-"""How far engines may be off in a test: MARGIN times the largest error that was measured where it runs.
-
-A test states the measured errors; whoever makes them smaller writes the new ones down.
-"""
+"""How far engines may be off in a test: MARGIN times the largest error that was measured where it runs. A
+test states the measured errors; whoever makes them smaller writes the new ones down."""
 
 from crosscheck.judge.truth import truth_for
 from mbref import rotations

@@ -1,8 +1,6 @@
-"""Costs of runs are CPU seconds, of building and of stepping, in every family of each adapter.
-
-A clock that advances by 1 s at each reading replaces the CPU clock. It is read at the start and end of
-building: 1 s. It is read at the start and end of stepping to each of three samples, 3 s, or to all, 1 s.
-"""
+"""Costs of runs are CPU seconds, of building and of stepping, in every family of each adapter. A clock that
+advances by 1 s at each reading replaces the CPU clock. It is read at the start and end of building: 1 s. It
+is read at the start and end of stepping to each of three samples, 3 s, or to all, 1 s."""
 
 import itertools
 import time

@@ -86,10 +86,8 @@ def test_an_endless_run_in_this_process_times_out_and_leaves_no_timer():
 
 @pytest.mark.parametrize(("fake", "status"), [("FAKE", "pass"), ("AGING", "fail"), ("KEEPING", "fail")])
 def test_check_repeated_fails_only_engines_whose_runs_depend_on_earlier_runs(fake, status):
-    """AGING moves bodies by 1e-14 m more in every run of a process, KEEPING by the first run's mass.
-
-    FAKE does not. A new process repeats the first run of each, so that the check `reordered` passes.
-    """
+    """AGING moves bodies by 1e-14 m more in every run of a process, KEEPING by the first run's mass. FAKE
+    does not. A new process repeats the first run of each, so that the check `reordered` passes."""
     bench = trial.set_up(Isolated(f"{FAKES}:{fake}", 60.0), SPECIMENS["pendulum"])
     repeated, reordered = (suite.verdict_on(check, bench) for check in ("repeated", "reordered"))
     assert repeated.status == status, repeated

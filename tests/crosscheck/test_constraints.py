@@ -1,8 +1,6 @@
-"""Constraint equations of engines' adapters, of mbref and of the judge describe equal constraints.
-
-The three sets share no code, and their rows differ. At states that meet the constraints, all have equal row
-spaces, ranks and least-norm accelerations.
-"""
+"""Constraint equations of engines' adapters, of mbref and of the judge describe equal constraints. The three
+sets share no code, and their rows differ. At states that meet the constraints, all have equal row spaces,
+ranks and least-norm accelerations."""
 
 from typing import NamedTuple
 

@@ -56,10 +56,8 @@ def test_a_table_of_a_driver_is_joined_by_scipys_cubic_spline(derivative, rows):
 
 
 def test_pieces_of_a_scenes_functions_end_at_rows_of_tables_and_at_start_and_stop():
-    """A table with rows at 0.3, 0.5 and 0.9 s, and a factor 1 + 2 t from 0.4 to 0.8 s.
-
-    At 0.8 s the factor is 0; as the end of the piece that began at 0.4 s it is 2.6.
-    """
+    """A table with rows at 0.3, 0.5 and 0.9 s, and a factor 1 + 2 t from 0.4 to 0.8 s. At 0.8 s the factor is
+    0; as the end of the piece that began at 0.4 s it is 2.6."""
     scene = Scene(
         name="s",
         body=(body(),),

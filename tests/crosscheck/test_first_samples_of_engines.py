@@ -1,8 +1,6 @@
-"""First samples of engines have the velocities, accelerations and reactions of the judge's equations.
-
-At t = 0, Gauss's principle gives the accelerations, and a balance of each body the reactions. The scenes have
-every joint, load and driver. A joint whose bodies are exchanged has the opposite reaction.
-"""
+"""First samples of engines have the velocities, accelerations and reactions of the judge's equations. At t =
+0, Gauss's principle gives the accelerations, and a balance of each body the reactions. The scenes have every
+joint, load and driver. A joint whose bodies are exchanged has the opposite reaction."""
 
 import functools
 from dataclasses import replace

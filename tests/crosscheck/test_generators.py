@@ -1,7 +1,5 @@
-"""Engines with generated code, CasADi and heyoka: true motions, refusals, and files in the cache.
-
-Runs are in child processes: CasADi and OpenSim do not share one.
-"""
+"""Engines with generated code, CasADi and heyoka: true motions, refusals, and files in the cache. Runs are in
+child processes: CasADi and OpenSim do not share one."""
 
 import subprocess
 import sys

@@ -85,10 +85,8 @@ def test_a_failed_engine_gives_a_crashed_trajectory_with_the_cause(fake: str, me
 
 
 def test_the_time_that_an_engine_needs_to_compile_extends_the_limit_of_a_run():
-    """The engine computes for 0.4 s, with a limit of 0.1 s and up to 10 s of compilation.
-
-    Both a child process and this process extend the limit; without compilation the run times out.
-    """
+    """The engine computes for 0.4 s, with a limit of 0.1 s and up to 10 s of compilation. Both a child
+    process and this process extend the limit; without compilation the run times out."""
     runner = InProcess(CompilingModels(), time_limit=0.1)
     for ended in (run("COMPILING_MODELS", time_limit=0.1), runner.observe(still(), TIMES, PLAIN).value):
         assert ended.outcome is Outcome.COMPLETED, ended.message

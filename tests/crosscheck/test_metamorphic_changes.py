@@ -1,8 +1,6 @@
-"""Relations of the suite / starts of changed scenes by Gauss's principle.
-
-The judge computes the start of the changed scene anew: poses, velocities, accelerations and reactions are
-those that the relation expects from the start of the scene itself.
-"""
+"""Relations of the suite / starts of changed scenes by Gauss's principle. The judge computes the start of the
+changed scene anew: poses, velocities, accelerations and reactions are those that the relation expects from
+the start of the scene itself."""
 
 import functools
 from dataclasses import replace

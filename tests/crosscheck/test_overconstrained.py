@@ -1,8 +1,6 @@
-"""Bricard's linkage, overconstrained in every position: the engines / the reference.
-
-No row is redundant by itself, and away from closed poses none is redundant at all: whoever resolves the rank
-of poses that are not quite closed follows rounding.
-"""
+"""Bricard's linkage, overconstrained in every position: the engines / the reference. No row is redundant by
+itself, and away from closed poses none is redundant at all: whoever resolves the rank of poses that are not
+quite closed follows rounding."""
 
 import functools
 

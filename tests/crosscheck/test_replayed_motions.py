@@ -1,8 +1,6 @@
-"""Drivers that a constant moment replaces, and motions that have none.
-
-Body b turns from 90° to 180° about z, while its centre moves from (1, 2, 0) to (4, 0, 5): a vector on it
-turns by 90°. Body c moves by (0, 0, 1) without turning.
-"""
+"""Drivers that a constant moment replaces, and motions that have none. Body b turns from 90° to 180° about z,
+while its centre moves from (1, 2, 0) to (4, 0, 5): a vector on it turns by 90°. Body c moves by (0, 0, 1)
+without turning."""
 
 import math
 from typing import Any

@@ -1,8 +1,6 @@
 """Robot files, and random ones: the scene's motion / MuJoCo's matrices of the original, integrated finely.
-
-The motion of the scene is the judge's, by Gauss's principle.  Loops and mimic joints that MuJoCo does not
-read from a URDF are added to its model here, by MjSpec.
-"""
+The motion of the scene is the judge's, by Gauss's principle. Loops and mimic joints that MuJoCo does not read
+from a URDF are added to its model here, by MjSpec."""
 
 from dataclasses import replace
 from pathlib import Path

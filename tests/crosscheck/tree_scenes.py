@@ -97,10 +97,8 @@ def driven() -> Scene:
 
 
 def ring(kind: str) -> Scene:
-    """A planar four-bar in three dimensions whose last joint, of the given kind, is the one to cut.
-
-    Fixed, revolute, cylindrical or universal: the planar motion is the same; the loop is redundant.
-    """
+    """A planar four-bar in three dimensions whose last joint, of the given kind, is the one to cut. Fixed,
+    revolute, cylindrical or universal: the planar motion is the same; the loop is redundant."""
     z = (0.0, 0.0, 1.0)
     last = JOINT_TYPES[kind].at("C", ("b", "c"), anchor=(0.7, 0.5, 0.0), axis=z, axes=(z, (0.0, 1.0, 0.0)))
     return Scene(

@@ -1,8 +1,6 @@
-"""Fuzz the doors of both packages: ``python -m tests.fuzz scene_file --count 20000 --seed 0``.
-
-Every case runs in a child process, so that a signal or a hang is found as an exception is.  Prints how the
-cases ended, and every defect with its seeds; exit status 1 where there is one.
-"""
+"""Fuzz the doors of both packages: ``python -m tests.fuzz scene_file --count 20000 --seed 0``. Every case
+runs in a child process, so that a signal or a hang is found as an exception is. Prints how the cases ended,
+and every defect with its seeds; exit status 1 where there is one."""
 
 import argparse
 import sys

@@ -1,8 +1,6 @@
-"""Random command lines of every command, generated from the parsers; their options take broken inputs.
-
-Each case runs in an empty folder. It checks the exit status, that no traceback and no character that acts on
-a terminal is printed, and that no file is written elsewhere than the command line says.
-"""
+"""Random command lines of every command, generated from the parsers; their options take broken inputs. Each
+case runs in an empty folder. It checks the exit status, that no traceback and no character that acts on a
+terminal is printed, and that no file is written elsewhere than the command line says."""
 
 import argparse
 import contextlib

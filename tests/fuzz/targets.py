@@ -1,8 +1,6 @@
-"""The cases of the fuzzers, each by its seed; anything that is not documented is raised.
-
-``scene_file``: reading, writing, diagnosing.  ``simulation``: a scene by a method within limits.
-``command_line``: every command of all programs.  A case that takes long is interrupted, which it has to hear.
-"""
+"""The cases of the fuzzers, each by its seed; anything that is not documented is raised. ``scene_file``:
+reading, writing, diagnosing. ``simulation``: a scene by a method within limits. ``command_line``: every
+command of all programs. A case that takes long is interrupted, which it has to hear."""
 
 import contextlib
 import json

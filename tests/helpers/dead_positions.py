@@ -8,10 +8,8 @@ from tests.helpers.parts import Entry, Point, hinge, slide
 
 def pushed(crank: float, rod: float, angle: float, speed: float, size: float = 1.0) -> tuple[Scene, float]:
     """Return a slider-crank whose slider is driven outwards, and the time (s) of crank and rod in line.
-
     ``crank`` and ``rod`` are lengths and ``speed`` a length per second in units of ``size`` (m); ``angle``
-    (rad) is the crank's at the start.
-    """
+    (rad) is the crank's at the start."""
     a, b = crank * size, rod * size
     tilt = -math.asin(crank * math.sin(angle) / rod)
     pin = (a * math.cos(angle), a * math.sin(angle), 0.0)
@@ -36,10 +34,8 @@ def pushed(crank: float, rod: float, angle: float, speed: float, size: float = 1
 
 
 def turned(crank: float, rod: float, angle: float, speed: float) -> tuple[Scene, float]:
-    """Return a slider-crank whose crank is driven and longer than its rod, and its dead time (s).
-
-    The rod is then perpendicular to the slider's line. Units are m, rad and rad/s.
-    """
+    """Return a slider-crank whose crank is driven and longer than its rod, and its dead time (s). The rod is
+    then perpendicular to the slider's line. Units are m, rad and rad/s."""
     scene, _ = pushed(crank, rod, angle, 1.0)
     time = (math.asin(rod / crank) - angle) / speed
     return scene.with_(driver=[{"joint": "O", "polynomial": [0.0, speed]}], duration=3.0 * time), time

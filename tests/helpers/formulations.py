@@ -22,10 +22,8 @@ def solve(
     formulation: Formulation, mass: np.ndarray, jacobian: np.ndarray, force: np.ndarray, gamma: np.ndarray,
     rank_tolerance: float = 1e-10, **options: float,
 ) -> tuple[int, np.ndarray, np.ndarray]:  # fmt: skip
-    """Return (status, q̈ (n,), λ (m,)); mass (n,) is the diagonal of M, jacobian (m, n).
-
-    Status is one of ``layout.OK``, ``SINGULAR``, ``NOT_CONVERGED``.
-    """
+    """Return (status, q̈ (n,), λ (m,)); mass (n,) is the diagonal of M, jacobian (m, n). Status is one of
+    ``layout.OK``, ``SINGULAR``, ``NOT_CONVERGED``."""
     m, n = jacobian.shape
     numbers = np.ascontiguousarray(jacobian, dtype=float)
     scratch = allocate(formulation.scratch, {"m": m, "n": n}) if formulation.scratch else _factor(numbers)

@@ -1,7 +1,5 @@
-"""Right engines of low order, and the same engines with a fault: the example engine with fixed steps.
-
-Its Runge–Kutta method of order 8 is replaced by a method of order 1 or 2 whose steps end at the samples.
-"""
+"""Right engines of low order, and the same engines with a fault: the example engine with fixed steps. Its
+Runge–Kutta method of order 8 is replaced by a method of order 1 or 2 whose steps end at the samples."""
 
 import types
 from collections.abc import Callable

@@ -8,10 +8,8 @@ from mbref.scene import Scene
 
 def unbalanced(scene: Scene, run: Trajectory) -> tuple[float, float]:
     """Return the largest force and moment that no reaction explains, relative to the largest of their kind.
-
     The scene has no loads: m a = m g + Σ reactions, and J ω' + ω × J ω = Σ moments about the centre of mass.
-    A joint's reaction acts on its second body at the anchor on that body, and reversed on its first body.
-    """
+    A joint's reaction acts on its second body at the anchor on that body, and reversed on its first body."""
     assert run.reactions is not None
     assert run.acceleration is not None
     assert run.angular_acceleration is not None

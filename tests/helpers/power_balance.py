@@ -1,8 +1,6 @@
 """Power balance of a motion, from its outputs alone: work of drivers and loads against the change of energy.
-
 Gravity and springs store energy: the work of all drivers and loads is the change of kinetic plus potential
-energy, without the energy of the springs, whose power is a load's.
-"""
+energy, without the energy of the springs, whose power is a load's."""
 
 from collections.abc import Mapping
 
@@ -25,11 +23,9 @@ def panel_times(duration: float, panels: int) -> np.ndarray:
 
 def unbalanced(columns: Mapping[str, np.ndarray], weight: float = 0.0) -> float:
     """Return the largest difference between mean power and change of energy over time / largest power, of all
-    panels that the motion completed and whose nodes resolve the power.
-
-    ``columns`` are the numbers of a motion at ``panel_times``, by name. ``weight`` (W) is another power to
-    which the difference may be relative. The result is NaN if there is no such panel.
-    """
+    panels that the motion completed and whose nodes resolve the power. ``columns`` are the numbers of a
+    motion at ``panel_times``, by name. ``weight`` (W) is another power to which the difference may be
+    relative. The result is NaN if there is no such panel."""
     panels, energy = (len(columns["time"]) - 1) // EACH, columns["energy"]
     powers = [values for name, values in columns.items() if name.endswith(").power")]
     stored = sum((values for name, values in columns.items() if name.endswith(").energy")), 0.0 * energy)

@@ -20,12 +20,10 @@ AT_REST = {"velocity": None, "angular_velocity": None}
 
 
 def powered_mechanism(seed: int) -> Scene:
-    """Return a mechanism with closed loops, armatures of hinges and slides, and loads of all types.
-
-    It has a coupling, and up to three drivers, where its freedoms allow them; of two mechanisms one has a
-    point mass on a massless link and a slide with armature, and one the ground as a body. The result depends
-    on the seed only.
-    """
+    """Return a mechanism with closed loops, armatures of hinges and slides, and loads of all types. It has a
+    coupling, and up to three drivers, where its freedoms allow them; of two mechanisms one has a point mass
+    on a massless link and a slide with armature, and one the ground as a body. The result depends on the seed
+    only."""
     rng = np.random.default_rng([seed, 11])
     scene = with_loads_of_joints(geared_mechanism(seed), seed, switched=False)
     if seed % 2:

@@ -1,8 +1,6 @@
-"""Catalogue of short motions: every joint, load, driver, coupling and armature, chains and loops.
-
-``MOTIONS`` maps a name to a maker of a scene. The judge has computed the states at three times, which
-``tests/doors/motion/exact_motions.json`` stores.
-"""
+"""Catalogue of short motions: every joint, load, driver, coupling and armature, chains and loops. ``MOTIONS``
+maps a name to a maker of a scene. The judge has computed the states at three times, which
+``tests/doors/motion/exact_motions.json`` stores."""
 
 from collections.abc import Callable
 from functools import partial

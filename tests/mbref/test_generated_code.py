@@ -1,7 +1,5 @@
-"""Machine code generated for a scene against the general kernels, which serve every scene.
-
-The general kernels are the truth here; other tests compare them with closed forms.
-"""
+"""Machine code generated for a scene against the general kernels, which serve every scene. The general
+kernels are the truth here; other tests compare them with closed forms."""
 
 import os
 import shutil

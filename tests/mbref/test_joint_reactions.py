@@ -1,7 +1,5 @@
-"""Joint reactions / forces and moments of bodies at rest, worked out by hand.
-
-The multipliers λ balance the forces that a test writes down: Φ_qᵀ λ = Q.
-"""
+"""Joint reactions / forces and moments of bodies at rest, worked out by hand. The multipliers λ balance the
+forces that a test writes down: Φ_qᵀ λ = Q."""
 
 import math
 from typing import Any

@@ -1,7 +1,5 @@
-"""Help with scene files: lines and suggestions in faults, probable slips, units, the schema, the commands.
-
-A probable slip is a valid number that is likely to be a mistake, as an angle in degrees.
-"""
+"""Help with scene files: lines and suggestions in faults, probable slips, units, the schema, the commands. A
+probable slip is a valid number that is likely to be a mistake, as an angle in degrees."""
 
 import json
 import math

@@ -1,8 +1,6 @@
 """Driven linkages tilted in space, whose lengths are known to rounding alone, pass their singular positions.
-
 A scissor of two equal bars is upright twice a turn, a bar on equal cranks is flat twice a turn; both motions
-follow from the driver in closed form.
-"""
+follow from the driver in closed form."""
 
 import numpy as np
 import pytest

@@ -54,10 +54,8 @@ def imported(path: Path) -> Iterator[str]:
 
 
 def origin(path: Path, node: ast.ImportFrom) -> str:
-    """Return the full name of the module from which a statement of a file imports.
-
-    Only ``reports`` imports relatively, since a wheel has it as ``crosscheck.reports``.
-    """
+    """Return the full name of the module from which a statement of a file imports. Only ``reports`` imports
+    relatively, since a wheel has it as ``crosscheck.reports``."""
     if not node.level:
         return str(node.module)
     package = path.relative_to(ROOT).parts[: -node.level]
@@ -67,11 +65,9 @@ def origin(path: Path, node: ast.ImportFrom) -> str:
 
 @functools.cache
 def graph(package: str) -> dict[str, set[str]]:
-    """Return module → modules of its package that it imports, also inside functions and for types alone.
-
-    Only an ``__init__`` may import under TYPE_CHECKING what it re-exports on first use: no arrow.  The
-    package's ``__init__`` modules count only where they are imported from by name.
-    """
+    """Return module → modules of its package that it imports, also inside functions and for types alone. Only
+    an ``__init__`` may import under TYPE_CHECKING what it re-exports on first use: no arrow. The package's
+    ``__init__`` modules count only where they are imported from by name."""
     modules = sources(package)
     return {name: _targets(path, modules) - {name} for name, path in modules.items()}
 
@@ -156,11 +152,9 @@ def floors(arrows: Graph) -> dict[str, int]:
 
 
 def upward(arrows: Graph, floors: Sequence[Sequence[str]]) -> list[str]:
-    """Arrows from a lower floor to a higher one; ``floors`` lists the parts of a package, lowest first.
-
-    A part is a folder or module below the package; the package's own __init__ stands above all.  Raises
-    ValueError for a part on no floor.
-    """
+    """Arrows from a lower floor to a higher one; ``floors`` lists the parts of a package, lowest first. A
+    part is a folder or module below the package; the package's own __init__ stands above all. Raises
+    ValueError for a part on no floor."""
     level = {part: i for i, floor in enumerate(floors) for part in floor}
     parts = {module: module.split(".")[1] if "." in module else "" for module in arrows}
     if missing := sorted({part for part in parts.values() if part} - set(level)):

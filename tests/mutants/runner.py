@@ -1,8 +1,6 @@
-"""Run tests in forks of a process that has imported the libraries, in a copy of the sources.
-
-A fork begins in a fraction of a second. It imports the project's packages anew, with the mutant that stands
-in the copy, as plain Python (``NUMBA_DISABLE_JIT=1``).
-"""
+"""Run tests in forks of a process that has imported the libraries, in a copy of the sources. A fork begins in
+a fraction of a second. It imports the project's packages anew, with the mutant that stands in the copy, as
+plain Python (``NUMBA_DISABLE_JIT=1``)."""
 
 import compileall
 import contextlib
@@ -88,11 +86,9 @@ class Copy:
         self._tests += [test for test in found if test.passes]
 
     def tests(self, mutant: Mutant) -> list[Recorded]:
-        """Return the tests that run the line of a mutant, the cheapest and closest first.
-
-        Other tests of their files come last: a line may run in the first test of a file alone, which keeps
-        its result for the others.
-        """
+        """Return the tests that run the line of a mutant, the cheapest and closest first. Other tests of
+        their files come last: a line may run in the first test of a file alone, which keeps its result for
+        the others."""
         wanted = places(self.place, PACKAGES, mutant)
         ordered = sorted(self._tests, key=Recorded.cost)
         first = [test for test in ordered if test.runs(wanted)]

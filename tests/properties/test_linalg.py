@@ -77,10 +77,8 @@ def norm(a):
 
 
 def penrose_ratios(d, inverse):
-    """Residuals of the four identities over ε max(m, n) ‖·‖ κ, κ = ‖D‖ ‖D⁺‖.
-
-    κ belongs there: rounding the entries of D⁺ alone makes residuals of that size, as is tested below.
-    """
+    """Residuals of the four identities over ε max(m, n) ‖·‖ κ, κ = ‖D‖ ‖D⁺‖. κ belongs there: rounding the
+    entries of D⁺ alone makes residuals of that size, as is tested below."""
     unit = np.finfo(float).eps * max(d.shape) * norm(d) * norm(inverse)
     return {
         "D D⁺ D = D": norm(d @ inverse @ d - d) / (unit * norm(d)),

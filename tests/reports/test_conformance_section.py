@@ -64,10 +64,8 @@ def test_explanations_name_known_engines_and_checks_and_every_check_has_a_proof(
 
 
 def test_random_violations_are_counted_by_check_with_the_worst_of_each(tmp_path):
-    """The worst is the largest multiple of what is allowed.
-
-    Of `truth`, drawn_1 violates by 1e-3 / 1e-6 = 1000 and drawn_0 by 2. Of `closure`, drawn_3 has no number.
-    """
+    """The worst is the largest multiple of what is allowed. Of `truth`, drawn_1 violates by 1e-3 / 1e-6 =
+    1000 and drawn_0 by 2. Of `closure`, drawn_3 has no number."""
     (tmp_path / "conformance").mkdir()
     tally = Tally(Plan("mujoco", 4))
     for seed, (check, measured, allowed) in enumerate(

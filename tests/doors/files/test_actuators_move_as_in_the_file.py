@@ -65,10 +65,8 @@ CONTROLS = [0.4, -0.7, 0.5, 1.2, -0.3, 0.8, 0.0, 0.0, 0.9]
 
 
 def test_servos_of_a_keyframe_accelerate_their_joints_as_in_mujoco(files):
-    """MuJoCo's qacc at a keyframe with random angles and speeds is the truth.
-
-    The keyframe is chosen by its name, or by its number if it has none.
-    """
+    """MuJoCo's qacc at a keyframe with random angles and speeds is the truth. The keyframe is chosen by its
+    name, or by its number if it has none."""
     random = np.random.default_rng(3)
     for name in ("pose", ""):
         qpos = " ".join(map(str, random.uniform(-4, 4, len(SERVOS))))

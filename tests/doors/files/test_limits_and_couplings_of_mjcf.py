@@ -102,10 +102,8 @@ def test_an_open_loop_is_closed_alike_at_every_size(files):
 
 
 def freedoms_with_tilt(files, tilt: float) -> int:
-    """Return the degrees of freedom of a loop of hinges, one of them tilted (rad).
-
-    Its 18 rows are of three bodies with 18 freedoms: there are as many degrees of freedom as redundant rows.
-    """
+    """Return the degrees of freedom of a loop of hinges, one of them tilted (rad). Its 18 rows are of three
+    bodies with 18 freedoms: there are as many degrees of freedom as redundant rows."""
     counts = mbref.counts(files.scene(two_cranks(0.3, tilt, rod=1.0), "a.xml")[0])
     assert (counts.rows, counts.degrees_of_freedom) == (18, counts.redundant)
     return counts.degrees_of_freedom

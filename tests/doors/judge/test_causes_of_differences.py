@@ -219,10 +219,8 @@ OF_ONE_SCENE = {
 
 
 def cases(explained: bool) -> list[object]:
-    """Return scenes, changes and parts of the expected sentences, of changes with or without explanation.
-
-    All except cases of the rod, whose motion is computed fastest, are slow. No gravity acts on the rod.
-    """
+    """Return scenes, changes and parts of the expected sentences, of changes with or without explanation. All
+    except cases of the rod, whose motion is computed fastest, are slow. No gravity acts on the rod."""
     named = {
         (s, n): case for s in SCENES for n, case in {**EVERYWHERE, **MORE, **SIMULATED}.items()
     } | OF_ONE_SCENE

@@ -126,10 +126,8 @@ def exact_motion(name: str) -> Trajectory:
 
 
 def bound_of(name: str) -> float:
-    """Return the bound on the difference of two motions, twice the bound of each.
-
-    A singular position magnifies the rounding of the scene's changed numbers: there it is 100 bounds.
-    """
+    """Return the bound on the difference of two motions, twice the bound of each. A singular position
+    magnifies the rounding of the scene's changed numbers: there it is 100 bounds."""
     return (100.0 if name in CROSSED else 2.0) * max(stored()[name]["bound"], 20 * ROUNDING)
 
 

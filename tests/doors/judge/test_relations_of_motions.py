@@ -72,11 +72,9 @@ def first_motion(name: str) -> tuple[Scene, Trajectory]:
 @pytest.mark.parametrize(("relation", "name"), CASES)
 def test_judge_moves_a_changed_mechanism_as_its_relation_expects(relation, name):
     """A relation says how the motion of a changed mechanism follows from the first motion: turned with the
-    frame, mirrored, in millimetres. The judge, accurate to 1e-13, computes both motions.
-
-    Differences are relative to the largest distance, rate and acceleration; each derivative loses a digit.
-    Expected reactions balance the accelerations where the relation keeps bodies and joints.
-    """
+    frame, mirrored, in millimetres. The judge, accurate to 1e-13, computes both motions. Differences are
+    relative to the largest distance, rate and acceleration; each derivative loses a digit. Expected reactions
+    balance the accelerations where the relation keeps bodies and joints."""
     scene, motion = first_motion(name)
     changed = RELATIONS[relation].change(scene, motion)
     if isinstance(changed, Outside):

@@ -1,9 +1,7 @@
-"""A seed or a name means one mechanism, to 12 digits, on every processor and in every version.
-
-Verdicts are stored with the name or the seed of their mechanism.  ``mechanisms.json`` has of each mechanism a
-checksum of its words, and two sums of its numbers with fixed weights. Where mechanisms are to change, make it
-anew by ``python -m tests.doors.machines.test_a_seed_means_one_mechanism``, and then all stored verdicts, too.
-"""
+"""A seed or a name means one mechanism, to 12 digits, on every processor and in every version. Verdicts are
+stored with the name or the seed of their mechanism. ``mechanisms.json`` has of each mechanism a checksum of
+its words, and two sums of its numbers with fixed weights. Where mechanisms are to change, make it anew by
+``python -m tests.doors.machines.test_a_seed_means_one_mechanism``, and then all stored verdicts, too."""
 
 import json
 import subprocess

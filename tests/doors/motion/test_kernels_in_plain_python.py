@@ -1,7 +1,5 @@
-"""Kernels as plain Python (``NUMBA_DISABLE_JIT=1``, for debugging) give the states of compiled kernels.
-
-Plain Python also refuses an index beyond an array, which compiled code does not notice.
-"""
+"""Kernels as plain Python (``NUMBA_DISABLE_JIT=1``, for debugging) give the states of compiled kernels. Plain
+Python also refuses an index beyond an array, which compiled code does not notice."""
 
 import json
 import os

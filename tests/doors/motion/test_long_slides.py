@@ -12,10 +12,8 @@ TIMES = np.linspace(0.0, END, 8)
 
 
 def beads(joints: list[Spherical | Cylindrical], length: float) -> Scene:
-    """Return two beads on an arm that turns at a constant speed; nothing holds them along the arm.
-
-    They are at START · length from the axis at the start, and the joints connect them.
-    """
+    """Return two beads on an arm that turns at a constant speed; nothing holds them along the arm. They are
+    at START · length from the axis at the start, and the joints connect them."""
     place, velocity = (START * length, 0.0, 0.0), (0.0, SPEED * START * length, 0.0)
     inertia = (0.1 * length**2,) * 3
     turning = {"mass": 1.0, "inertia": inertia, "angular_velocity": (0.0, 0.0, SPEED)}

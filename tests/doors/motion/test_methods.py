@@ -33,9 +33,7 @@ def errors(name: str, method: str, rtol: float = RTOL) -> tuple[float, float, mb
 
 def limit(formulation: str) -> float:
     """Return the largest error of poses at ``RTOL``: a fifth of the tolerance if nothing is iterated.
-
-    Measured errors are about a fiftieth of it. Rates have three times as much.
-    """
+    Measured errors are about a fiftieth of it. Rates have three times as much."""
     return (1.0 if formulation in ITERATED else 0.2) * RTOL
 
 

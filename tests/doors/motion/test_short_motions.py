@@ -14,10 +14,8 @@ STEPS = 1050  # of all motions together, which took 970 once: more mean that ste
 
 
 def tolerance(steps: int) -> float:
-    """Return the error of poses that rounding in so many steps and at the start (20 more) explains.
-
-    Each step has a margin of 20 roundings. Rates and violations have ten times as much.
-    """
+    """Return the error of poses that rounding in so many steps and at the start (20 more) explains. Each step
+    has a margin of 20 roundings. Rates and violations have ten times as much."""
     return 20 * ROUNDING * (20 + steps)
 
 

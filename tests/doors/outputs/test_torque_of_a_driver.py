@@ -1,8 +1,6 @@
 """Torque and force of a driver, by closed forms: what its motor delivers for bodies, armature and couplings.
-
 Driver A turns by φ(t) = 0.4 t + 1.5 t² + 0.3 sin 4t rad, or slides by as many m. ANGLE, RATE and SECOND are
-φ, φ' and φ''. A torque is the inertia that the motor sees times φ'', and the power torque times φ'.
-"""
+φ, φ' and φ''. A torque is the inertia that the motor sees times φ'', and the power torque times φ'."""
 
 from itertools import pairwise
 
