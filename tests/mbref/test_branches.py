@@ -67,7 +67,7 @@ def test_second_branch_of_a_swinging_rhombus_keeps_the_energy_and_leaves_the_smo
     assert np.ptp(run.energy) < LOST
     off = np.abs(run.position - simulate(scene, "taylor", times).position).max(axis=(1, 2))
     behind = times > run.crossings[0].time
-    assert off[~behind].max() < 1e-9 and off[behind][1:].min() > 1e-3  # m
+    assert off[~behind].max() < ROUNDING and off[behind][1:].min() > 1e-3  # m
 
 
 @pytest.mark.parametrize("loops", [2, 3])
@@ -89,7 +89,7 @@ def test_second_branch_of_a_chain_folds_its_first_loop_and_keeps_the_energy(loop
     assert run.outcome.label == "COMPLETED" and np.ptp(run.energy) < LOST
     behind = times > run.crossings[0].time
     folded = run["bar1"].position[behind] - run["upright1"].position[behind]
-    assert behind.any() and np.abs(folded).max() < 1e-9, "m: the first bar lies on the second upright"
+    assert behind.any() and np.abs(folded).max() < ROUNDING, "the first bar lies on the second upright"
 
 
 def test_requests_for_a_branch_or_a_crossing_that_does_not_exist_are_refused():

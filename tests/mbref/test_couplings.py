@@ -48,7 +48,8 @@ def test_jacobian_and_gamma_of_coupled_mechanisms_are_differences_of_phi(make):
 
 
 def test_bearings_carry_the_tooth_torques_of_a_gear_pair():
-    """With the pinion's acceleration α = M / (J_A + r² J_B), the torques are r α J_B and α J_A - M."""
+    """With the pinion's acceleration α = M / (J_A + r² J_B), the torques are r α J_B and α J_A - M, to
+    rounding. M = 2 N m, J_A = 0.03 kg m², J_B = 0.2 kg m², r = -0.5."""
     motion = mbref.simulate(gear_pair(), times=[0.0, 1.0])
     change = 2.0 / (0.03 + 0.5**2 * 0.2)
     assert motion.joint("B").moment[:, 2] == pytest.approx(-0.5 * change * 0.2, rel=1e-12)
@@ -56,7 +57,8 @@ def test_bearings_carry_the_tooth_torques_of_a_gear_pair():
 
 
 def test_reaction_of_a_hinge_includes_the_torque_of_its_armature():
-    """The rotor of I = 0.3 kg m² resists by -I φ̈ about the axis."""
+    """The rotor of I = 0.3 kg m² resists by -I φ̈ about the axis of a hinge that transmits no other
+    moment."""
     motion = mbref.simulate(pendulum(), times=[0.0])
     change = motion.angular_acceleration[0, 0, 2]
     assert motion.joint("A").moment[0, 2] == pytest.approx(-0.3 * change, rel=1e-12)
@@ -110,6 +112,7 @@ def test_saved_scene_keeps_couplings_and_armatures(tmp_path):
 
 
 def test_velocities_that_contradict_a_coupling_are_refused():
+    """Both wheels are given 1 rad/s; the ratio is -0.5."""
     bodies = [body.model_copy(update={"angular_velocity": (0.0, 0.0, 1.0)}) for body in gear_pair().body]
     with pytest.raises(SceneError, match=r"teeth.*velocities given to bodies violate it"):
         mbref.simulate(gear_pair().with_(body=tuple(bodies)), times=[0.0])

@@ -142,8 +142,9 @@ def test_command_prints_mean_and_deviation_of_single_runs(tmp_path: Path, capsys
     assert (status, printed["completed"]) == (0, 4)
     runs = [simulate(s, METHOD, [0.01], LIMITS) for s in variants(DRIVEN, VARY[:1], 4)]
     places = np.array([run.position[-1, 2] for run in runs])
-    assert np.allclose(printed["mean_position"]["slider"], places.mean(axis=0), rtol=0, atol=1e-13)
-    assert np.allclose(printed["deviation_position"]["slider"], places.std(axis=0), rtol=0, atol=1e-13)
+    rounding = 1e-13  # m, of a sum of four
+    assert np.allclose(printed["mean_position"]["slider"], places.mean(axis=0), rtol=0, atol=rounding)
+    assert np.allclose(printed["deviation_position"]["slider"], places.std(axis=0), rtol=0, atol=rounding)
     assert len(path.read_text().splitlines()) == 4
     main(command)
     assert "4 of 4 variants completed" in (said := capsys.readouterr().out) and "runs a second" in said

@@ -18,7 +18,7 @@ def by_sign(eigenvalues):
 
 
 def test_a_pendulum_is_stable_below_and_unstable_above_its_hinge():
-    """s² = ∓ m g l / (J + m l²), and the hinge carries the weight."""
+    """s² = ∓ m g l / (J + m l²), to rounding, and the hinge carries the weight."""
     found = {each.stability: each for each in equilibria(pendulum(), starts=8)}
     assert set(found) == {"stable", "unstable"} and len(equilibria(pendulum(), starts=8)) == 2
     rate = np.sqrt(MASS * G * ARM / (INERTIA + MASS * ARM**2))

@@ -133,6 +133,7 @@ def test_warning_calls_a_run_inaccurate_if_the_error_at_a_tighter_rtol_is_below_
 
 
 def test_estimate_of_a_run_in_fixed_steps_has_no_warning():
+    """Such a run has no rtol, with which its errors, up to 0.3, could be compared."""
     found = estimate(0.0, 0.1, 0.2, 0.3, rtol=None)
     assert not found.warning and found.sentence == "largest estimated error: 3.0e-01"
 

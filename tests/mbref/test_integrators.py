@@ -172,6 +172,7 @@ def test_order_of_adams_outside_1_to_12_is_refused(order):
 
 
 def test_coefficients_of_dop853_are_those_of_scipy():
+    """To the bit: A, B and C of the stages, and weights of the error estimates of order 3 and 5."""
     theirs = scipy.integrate.DOP853
     assert np.array_equal([[*row, *[0.0] * (STAGES - len(row))] for row in A], theirs.A[:STAGES, :STAGES])
     assert np.array_equal((B, C), (theirs.B, theirs.C[:STAGES]))
@@ -185,7 +186,8 @@ def test_error_of_a_long_run_stays_below_a_thousand_tolerances(end, method):
     added up to 1.4e-5 in 100 s."""
     scene = next(scene for scene in stability.scenes() if scene.name == f"duration[{end:g}]")
     run = simulate(scene, method, np.linspace(0.0, end, 11), Limits(rtol=1e-9))
-    assert run.outcome.label == "COMPLETED" and measure(scene, run, truth_for(scene))["error"] < 1e-6
+    assert run.outcome.label == "COMPLETED", run.message
+    assert measure(scene, run, truth_for(scene))["error"] < 1000 * 1e-9
 
 
 def test_run_at_ten_million_radians_a_second_completes_in_2000_steps_and_meets_the_truth():

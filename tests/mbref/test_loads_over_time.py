@@ -41,7 +41,7 @@ def test_driver_by_a_table_of_a_cubic_turns_by_the_cubic(method):
 
 
 def test_acceleration_at_the_time_of_switching_is_the_one_afterwards():
-    """A force of 2 N on 2 kg from 0.5 s to 1.5 s: 0, 1, 1 and 0 m/s²."""
+    """A force of 2 N on 2 kg from 0.5 s to 1.5 s: 0, 1, 1 and 0 m/s² at 0, 0.5, 1 and 1.5 s, to rounding."""
     for method in METHODS:
         motion = run(scenes.pushed(Factor(start=0.5, stop=1.5)), method, [0.0, 0.5, 1.0, 1.5])
         along = motion.acceleration[:, 0] @ AXIS

@@ -172,6 +172,7 @@ def test_largest_reaction_is_the_largest_force_of_any_joint(sprung):
 
 
 def test_columns_of_a_driver_are_its_torque_power_and_open_components(sprung):
+    """In the order in which columns are requested, after the time."""
     expected = ["time", "driver(A).torque", "driver(A).power", "driver(A).open", "energy"]
     assert list(sprung.columns("driver(A)", "energy")) == expected
 

@@ -246,8 +246,8 @@ def test_sign_and_logarithm_of_a_determinant_are_numpy_s(n, seed, scale):
 
 @given(seed=st.integers(0, 2**32 - 1), m=st.integers(1, 20), freedoms=st.integers(0, 20))
 def test_formulations_agree_with_the_dense_kkt_system_of_independent_rows(seed, m, freedoms):
-    """Random M, Φ_q and γ; relative errors are below 1e-9, where alf stops to iterate. Six formulations must
-    succeed."""
+    """Random M, Φ_q and γ; relative errors are below 1e-9, the change at which alf stops its iterations. Six
+    formulations must succeed."""
     rng = np.random.default_rng(seed)
     n = m + freedoms
     jacobian = rng.normal(size=(m, n)) + np.eye(m, n) * 3

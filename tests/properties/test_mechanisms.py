@@ -84,7 +84,7 @@ def test_motion_follows_gauss_s_principle_keeps_its_energy_and_returns_with_reve
     apart = difference(scene, motion, exact)
     assert apart < MOVED, f"mbref and Gauss's principle differ by {apart:.1e}: {scene}"
     drift = energy_series(scene, motion)
-    assert drift is None or drift.max() < 1e-5, f"energy drifts by {drift.max():.1e}: {scene}"
+    assert drift is None or drift.max() < 10 * MOVED, f"energy drifts by {drift.max():.1e}: {scene}"
     back = run(started(scene, motion, len(motion.times) - 1, -1.0, scene.duration), 9)
     position, orientation = back.position[-1] - motion.position[0], back.orientation[-1]
     turned = rotations.angle_between(orientation, motion.orientation[0]).max()
@@ -127,6 +127,8 @@ def test_paper_s_mechanisms_with_random_masses_balance_their_reactions(scene):
 
 @given(st.integers(0, 5), st.data())
 def test_random_matrices_have_the_requested_rank_and_spectrum(rank, data):
+    """By NumPy's singular values: of matrices by rank, and of matrices with the singular values 3 and
+    0.001."""
     matrix = data.draw(matrices(rank=rank))
     assert np.linalg.matrix_rank(matrix, rtol=1e-9) == rank, matrix.shape
     spectrum = (3.0, 1e-3)
