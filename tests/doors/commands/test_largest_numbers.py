@@ -89,6 +89,21 @@ def test_sample_time_that_no_motion_reaches_is_refused_before_any_run(command: s
     assert status == 2 and f"--times: {says}" in said
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--times=0.2,0.1"], "must be finite, not negative and increasing, got 0.2,0.1"),
+        (["--times=0,nan"], "must be finite, not negative and increasing, got 0,nan"),
+        (["--times=-1,0"], "must be finite, not negative and increasing, got -1,0"),
+        (["--times=1,x"], "must be numbers separated by commas, got '1,x'"),
+        (["--times=1", "--duration=0.5"], "none is within --duration 0.5"),
+    ],
+)
+def test_times_of_mbref_that_are_no_samples_are_refused_with_the_option(words: list[str], says: str, capsys):
+    assert mbref(["run", "four_bar", *words]) == 2
+    assert capsys.readouterr().err == f"--times: {says}\n"
+
+
 @pytest.mark.parametrize("option", ["--duration", "--times"])
 @pytest.mark.parametrize(
     "command", [("run",), ("plot",), ("animate",), ("ensemble", "--vary", "duration=0.1:0.2")], ids=" ".join

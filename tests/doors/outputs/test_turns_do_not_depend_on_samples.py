@@ -140,8 +140,8 @@ def test_angle_of_each_scene_of_a_batch_counts_its_full_turns():
 
 
 def test_angle_of_an_engine_without_turns_is_nan_where_its_samples_are_too_far_apart():
-    """Poses and rates at 5 ms determine the turns between them; those at 0, 0.7 and 3 s do not.
-    The energy has that of the spring, so it is not known there either."""
+    """Poses and rates at 5 ms determine the turns between them; those at 0, 0.7 and 3 s do not, nor does a
+    first sample at 2.9 s. The energy has that of the spring, so it is not known there either."""
     motion = mbref.simulate(wound_wheel(), times=TIMES)
     dense = mbref.Motion.of(motion.mechanism, replace(motion, angles=None))
     assert dense.joint("H").angle == pytest.approx(motion.joint("H").angle, abs=1e-9)
@@ -149,6 +149,8 @@ def test_angle_of_an_engine_without_turns_is_nan_where_its_samples_are_too_far_a
     sparse = mbref.Motion.of(few.mechanism, replace(few, angles=None))
     assert np.isnan(sparse.joint("H").angle).tolist() == [False, True, True]
     assert np.isnan(sparse.energy).tolist() == [False, True, True]
+    late = mbref.simulate(wound_wheel(), times=[2.9, 2.905])
+    assert np.isnan(mbref.Motion.of(late.mechanism, replace(late, angles=None)).joint("H").angle).all()
 
 
 def test_judge_sees_a_miscounted_turn_of_few_samples_as_a_change_of_energy():
