@@ -28,7 +28,7 @@ COPIED = (*PACKAGES, "tests", "examples", "benchmarks", "docs", "pyproject.toml"
 OPTIONS = ("-q", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning")
 KILLED, SURVIVED, UNREACHED, OUT_OF_TIME = "killed", "survived", "not run by any test", "out of time"
 LONGEST = 10.0  # CPU s of a test without mutants, beyond which it is left out
-WAITING = 5.0  # wall time / CPU time, after which a test waits for something that does not come
+WAITING = 10.0  # wall time / CPU time, after which a test waits for something that does not come
 SPARE, HANGS = 20.0, 10.0  # CPU s, and CPU time / usual time, beyond both of which a mutant loops for ever
 ENDS = (pytest.ExitCode.OK, pytest.ExitCode.INTERRUPTED, pytest.ExitCode.NO_TESTS_COLLECTED)
 BATCHES = (10, 40, 160, 640)  # first tests of a mutant, whose files pytest collects together
@@ -139,7 +139,7 @@ def _file(test: str) -> str:
 
 def _forked(place: Path, work: Callable[[Path], None], limit: float) -> tuple[float, dict[str, Any] | None]:
     """Return the CPU s of a fork in a copy of the sources, and the answer that it writes: nothing where it
-    crashes, None where it exceeds its CPU s."""
+    crashes, None where it exceeds its CPU s, or waits too long, which counts as all its CPU s."""
     with tempfile.TemporaryDirectory() as folder:
         out, end = Path(folder) / "answer", time.monotonic() + WAITING * limit
         sys.stdout.flush()
@@ -153,7 +153,7 @@ def _forked(place: Path, work: Callable[[Path], None], limit: float) -> tuple[fl
                 os._exit(0)
         status, seconds = _wait(child, end)
         if os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL):
-            return seconds, None
+            return max(seconds, limit * (os.WTERMSIG(status) == signal.SIGKILL)), None
         return seconds, json.loads(out.read_text()) if out.exists() else {}
 
 
