@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import mbref
+from mbref.input_error import InputError
 from mbref.scenes import SCENES
 
 PENDULUM = SCENES["point_pendulum"]().with_(duration=0.2)
@@ -50,3 +51,19 @@ def test_motion_is_saved_as_json_only(saved, tmp_path):
     assert not (tmp_path / "run.mp4").exists()
     run.save(tmp_path / "run.JSON")
     assert (tmp_path / "run.JSON").exists()
+
+
+@pytest.mark.parametrize(
+    ("times", "says"),
+    [
+        ([], "needs at least one sample time"),
+        ([[0.0, 0.1]], "needs at least one sample time"),
+        ([0.1, 0.1], "must be finite, not negative and increasing"),
+        ([-0.1, 0.1], "must be finite, not negative and increasing"),
+        ([0.0, float("nan")], "must be finite, not negative and increasing"),
+        (["soon"], "must be numbers"),
+    ],
+)
+def test_times_of_simulate_that_are_no_samples_are_refused(times, says):
+    with pytest.raises(InputError, match=f"^times: {says}$"):
+        mbref.simulate("four_bar", times=times)
