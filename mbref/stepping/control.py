@@ -21,7 +21,7 @@ def control_of(model: Model, method: Method, times: np.ndarray, limits: Limits) 
     """Return the limits of a run that ends at the last of the times (k,), s."""
     integrator, span = method.integrator, float(times[-1]) or 1.0
     options, largest_step = method.options_of(integrator), limits.largest_step or span
-    turn = UNWRAPPED if model.has_angles else method.stabilisation.largest_turn
+    turn = min(method.stabilisation.largest_turn, UNWRAPPED if model.has_angles else np.inf)
     return Control(
         order=integrator.highest_order(options),
         fixed_step=0.0 if integrator.adaptive else min(options["step"], largest_step),

@@ -97,3 +97,11 @@ def test_partitioning_passes_a_singular_position_in_its_first_step(step):
 def test_partitioning_keeps_branches_and_energies_of_crank_rockers_from_many_starts(lengths, part, step):
     """Starts are parts of half a turn, some next to the singular position, with twice its limit of 1 mm."""
     assert deviation(lengths, part * math.pi, step) < 2e-3
+
+
+def test_loose_tolerance_bounds_errors_of_velocities_of_a_four_bar():
+    """Velocities at rtol 1e-3 agree with the default method to 1e-2 of the largest."""
+    times = np.linspace(0.25, 1.0, 4)
+    exact = mbref.simulate("four_bar_gravity", times=times)
+    found = mbref.simulate("four_bar_gravity", "alf-dual+partitioning", times, mbref.Limits(rtol=1e-3))
+    assert np.abs(found.velocity - exact.velocity).max() < 1e-2 * np.abs(exact.velocity).max()
