@@ -8,19 +8,21 @@ from tests import kills
 
 WHOLE = (200, 20)  # runs, kills
 FEW = {"parents": (30, 2), "children": (6, 1), "workers": (6, 1)}
-MOST_REPEATED = 3  # runs under way when a parent is killed: two in threads, and one that is being written
+MOST_REPEATED = (
+    3  # runs not yet stored when a process is killed: two under way, and one that is being written
+)
 
 
 @pytest.mark.parametrize(
     ("kind", "runs", "times"),
     [*((k, *few) for k, few in FEW.items()), *(pytest.param(k, *WHOLE, marks=pytest.mark.slow) for k in FEW)],
 )
-def test_killed_processes_lose_no_record_and_repeat_no_finished_run(
+def test_killed_processes_lose_no_record_and_repeat_no_stored_run(
     kind: str, runs: int, times: int, tmp_path: Path
 ):
     """A study's parent, an engine's child process or an ensemble's worker gets SIGKILL at random moments;
-    each record is then there once, and a kill costs one run at most."""
+    each record is then there once. A kill makes at most one record CRASHED."""
     found = kills.KINDS[kind](runs, times, tmp_path)
     assert found.kills == times and found.found == found.wanted and not found.twice, f"{kind}: {found}"
     assert found.crashed <= times, f"{kind}: {found}"
-    assert found.made <= runs + MOST_REPEATED * times, f"{kind}: {found}: finished runs were repeated"
+    assert found.made <= runs + MOST_REPEATED * times, f"{kind}: {found}: stored runs were repeated"

@@ -44,12 +44,11 @@ def test_second_axis_of_a_universal_joint_is_made_perpendicular(cosine):
     assert np.abs(gap).max() <= ROUNDED
 
 
-def test_perpendicular_axes_are_read_unchanged():
-    """Axes that are perpendicular up to rounding, or were made so by a first reading, stay to the last
-    bit."""
-    for cosine in (1e-16, 0.04):
-        joint = pendulum(cosine).joint[0]
-        assert Universal(**dict(joint)).axes == joint.axes
+@pytest.mark.parametrize("cosine", [1e-16, 0.04])
+def test_second_reading_leaves_the_axes_unchanged(cosine):
+    """A joint that is made from the axes of another one has them to the last bit."""
+    joint = pendulum(cosine).joint[0]
+    assert Universal(**dict(joint)).axes == joint.axes
 
 
 @pytest.mark.parametrize("name", SETTINGS)

@@ -65,8 +65,8 @@ def test_steady_poses_are_balanced_with_symmetric_positive_mass_matrix(judged):
 
 
 def test_four_bar_with_diagonal_spring_has_its_closed_form_eigenvalues():
-    """I s² + c d'² s + V'' = 0, solved in thirty digits by python-flint. Newton's method gives V' = 0; the
-    angle is the one that the IFToMM benchmark prints, up to its 4e-11 rad."""
+    """I s² + c d'² s + V'' = 0 with I = 5/3, d = 2 cos(θ/2), V = 2 g sin θ + k (d − √2)²/2, in thirty digits
+    by python-flint. Newton's method gives V' = 0; the IFToMM benchmark prints the angle, up to 4e-11 rad."""
     flint = pytest.importorskip("flint")
     flint.ctx.dps = 30
     angle, two, gravity = flint.arb("2.2343"), flint.arb(2), flint.arb("9.81")

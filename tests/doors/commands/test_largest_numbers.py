@@ -84,7 +84,9 @@ def test_duration_that_is_not_positive_or_too_long_is_refused_before_any_run(com
     ],
 )
 @pytest.mark.parametrize("command", ["run", "compare"])
-def test_sample_time_that_no_motion_reaches_is_refused_before_any_run(command: str, text: str, says, capsys):
+def test_sample_time_beyond_the_largest_or_not_increasing_is_refused_by_its_option(
+    command: str, text: str, says, capsys
+):
     status, said = ended(capsys, command, "four_bar", "--times", f"0,{text}")
     assert status == 2 and f"--times: {says}" in said
 

@@ -86,10 +86,13 @@ def test_table_is_written_through_a_link_into_its_target_which_keeps_its_permiss
 
 def test_picture_with_the_default_name_is_replaced_only_with_force(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(["draw", "four_bar"]) == 0
+    picture = tmp_path / "four_bar.svg"
+    picture.write_text("my own")
     assert main(["draw", "four_bar"]) == 2
     assert "four_bar.svg: exists already" in capsys.readouterr().err
+    assert picture.read_text() == "my own"
     assert main(["draw", "four_bar", "--force"]) == 0
+    assert "<svg" in picture.read_text()
     assert [path.name for path in tmp_path.iterdir()] == ["four_bar.svg"]
 
 
