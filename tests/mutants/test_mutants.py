@@ -68,7 +68,7 @@ def test_mutant_of_a_small_package_is_killed_by_the_test_that_runs_its_line(tmp_
     }.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
-    command = [sys.executable, "-m", "tests.mutants", "--count", "20", "--budget", "20"]
+    command = [sys.executable, "-m", "tests.mutants", "--count", "20", "--budget", "30"]
     own = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}  # crosscheck's plugin imports the real mbref
     done = subprocess.run(command, cwd=tmp_path, env=own, capture_output=True, text=True, check=True)
     lines = done.stdout.splitlines()
