@@ -41,9 +41,11 @@ class Newton:
         self.left, self.stiffness, right = np.linalg.svd(tangent.slope())
         self.directions = right.T
         self.sizes = np.linalg.norm(tangent.basis @ self.directions, axis=0)
-        forces = np.abs(self.left.T) @ tangent.pushes
+        pushes = np.abs(self.left.T) @ tangent.pushes
         placed = PLACED * self.stiffness / self.sizes
-        self.bound, self.rounding = BALANCED * forces + placed, BALANCE_ROUNDING * forces + placed / 16
+        self.bound, self.rounding = BALANCED * pushes + placed, BALANCE_ROUNDING * pushes + placed / 16
+        # directions (f,) along which the forces on the bodies give a small displacement
+        self.is_stiff = pushes * self.sizes < STIFF * self.stiffness
 
     def parts(self, off: np.ndarray) -> np.ndarray:
         """Return the accelerations (f,) along u of x'' (n,)."""
@@ -88,7 +90,7 @@ class Newton:
 
         A long step along a soft direction leaves this balance by its curvature, as it leaves the constraints.
         """
-        moved, is_stiff, before = self.tangent.moved(y), self._is_stiff, np.inf
+        moved, is_stiff, before = self.tangent.moved(y), self.is_stiff, np.inf
         if moved is None or not is_stiff.any() or moved.freedoms != self.tangent.freedoms:
             return moved
         for _ in range(MOST_RETURNS):
@@ -102,12 +104,6 @@ class Newton:
                 return moved
             moved, before = back, size
         return moved
-
-    @property
-    def _is_stiff(self) -> np.ndarray:
-        """Directions (f,) along which the forces on the bodies give a small displacement."""
-        pushes = np.abs(self.left.T) @ self.tangent.pushes
-        return np.asarray(pushes * self.sizes < STIFF * self.stiffness)
 
     def softened(self, y: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """Return a direction y (f,) with less of each direction that a spring holds.

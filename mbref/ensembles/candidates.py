@@ -33,10 +33,9 @@ class Parameters:
     """
 
     def __init__(self, values: Sequence[tuple[Any, ...]], saved: SavedNumbers | None = None):
-        self._numbers = [(target, *of_all) for target, *of_all in values if len(of_all) > 1]
-        self._arrays = [
-            (bytes_of(target), *_rows(target, *of_all)) for target, *of_all in values if len(of_all) == 1
-        ]
+        self._numbers = [value for value in values if len(value) == 3]
+        arrays = [value for value in values if len(value) == 2]
+        self._arrays = [(bytes_of(target), *_rows(target, of_all)) for target, of_all in arrays]
         self._saved = saved
 
     def write(self, place: int) -> None:

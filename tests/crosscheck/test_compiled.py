@@ -276,8 +276,8 @@ def test_mujocos_projected_compiled_family_moves_as_in_python_and_keeps_joints_c
 
 @pytest.mark.parametrize("name", DRIVEN)
 def test_newton_on_mujocos_closures_gives_the_true_driven_motion(name: str) -> None:
-    """The error exceeds its measured value (table DRIVEN) at most MARGIN times; that of velocities and
-    accelerations, relative to the largest, is 1e-11 measured and 1e-9 allowed."""
+    """The error of positions exceeds its measured value (table DRIVEN) at most MARGIN times. Velocities and
+    accelerations have a relative error of 1e-11 measured; 1e-9 is allowed."""
     pytest.importorskip("mujoco")
     tolerance, measured = DRIVEN[name]
     scene = SCENES[name]()

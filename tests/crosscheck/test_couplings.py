@@ -65,8 +65,8 @@ def test_engines_without_couplings_and_armatures_refuse_them_by_name(name):
 
 
 def test_armatures_count_in_the_start_velocities_of_least_kinetic_energy():
-    """Velocities that the scene leaves open minimise the kinetic energy with that of the rotors, as those of
-    the judge's reference, in long doubles, do."""
+    """Velocities that the scene leaves open minimise the kinetic energy of bodies and rotors. The judge's
+    reference has the same velocities, in long doubles."""
     scene = spatial_chain()
     exact = natural_motion(scene, TIMES[:1], EXTENDED, seconds=60.0)
     assert np.abs(mbref.simulate(scene, times=[0.0]).velocity[0] - doubles(exact.velocity[0])).max() < APART
@@ -94,8 +94,8 @@ def test_engines_without_couplings_or_armatures_refuse_them_by_the_kind(name, ma
 
 @pytest.mark.parametrize(("name", "make"), [pair for pair in PAIRS if not lacks(*pair.values)])
 def test_engines_move_coupled_joints_as_the_reference(name, make):
-    """Errors against the judge's truth stay below ENGINES; those of reactions below 1e-6 of the largest
-    one."""
+    """Errors of the states against the judge's truth stay below ENGINES. Reactions differ from the truth by
+    less than 1e-6 of the largest reaction."""
     pytest.importorskip(MODULES.get(name, name))
     scene, simulator = make().with_(duration=0.4), engine(name)
     fine = FINE[name] if name in FINE else simulator.settings_of(scene, FAMILIES[name])[-1]
@@ -136,8 +136,8 @@ def test_bullet_moves_coupled_joints_to_first_order(make):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_start_accelerations_of_random_geared_mechanisms_agree(seed):
-    """mbref's accelerations equal those of Gauss's principle, which the judge solves by itself, up to 1e-13
-    over the least singular value of the rows; MuJoCo's, with soft closures, equal them to 1e-7."""
+    """The judge solves Gauss's principle by itself. Accelerations of mbref differ from its solution by 1e-13
+    over the least singular value of the rows, accelerations of MuJoCo with soft closures by 1e-7."""
     scene = geared_mechanism(seed)
     assert scene.coupling
     found = compare(scene, ["mujoco"])

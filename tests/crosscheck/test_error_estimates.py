@@ -32,7 +32,7 @@ def test_error_that_mbref_estimates_equals_the_error_against_the_truth():
 
 
 def test_an_estimate_that_needs_more_than_its_time_is_left_out_and_the_run_is_unchanged():
-    """The limit is 0 s; the positions equal those of a run without estimate."""
+    """The limit is 0 s. The run has the positions of a run without estimate."""
     run = serve.run_estimated("mbref", SCENE, TIMES, LOOSE, 0.0)
     found = run.to_record()["error_estimate"]
     assert found["largest"] is None and "more than 0 s" in found["reason"]

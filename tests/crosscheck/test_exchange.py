@@ -109,7 +109,7 @@ def test_an_mjcf_file_written_and_read_again_moves_as_before(name, tmp_path):
 
 def test_piston_of_a_cut_slide_is_read_in_two_parts_with_its_mass_after_a_round_trip(tmp_path):
     """The writer cuts the loop at the slide, joint 4: a share of the piston moves along it, and the rest is
-    fixed to the pin and read as part of it. The masses of both are those of pin and piston."""
+    fixed to the pin and read as part of it. Both parts together have the mass of pin and piston."""
     scene = formats.read(MODELS / "slider_crank.xml").scene
     formats.write(scene, tmp_path / "again.xml")
     again = formats.read(tmp_path / "again.xml")

@@ -193,7 +193,7 @@ def test_slide_springs_and_keyframe_motors_are_imported_as_loads(tmp_path):
 
 
 def test_motors_without_a_keyframe_are_no_loads(tmp_path):
-    """Of the file's loads only the spring and the damper of its joints remain."""
+    """The scene has the spring and the damper of the joints, and no other load of the file."""
     plain = MOTORS.replace("SERVO", "").replace("SERVED", "")
     loads = read(tmp_path, plain).scene.load
     assert sorted(load.type for load in loads) == ["slide_spring", "torsion_spring"]

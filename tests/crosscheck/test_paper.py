@@ -160,7 +160,7 @@ def test_fold_satisfies_the_driver_from_pi_and_not_from_zero():
 
 @pytest.mark.slow
 def test_table_i_has_the_paper_s_letters_and_all_end_times_but_three():
-    """Of 33 cells none differs in its letter, and at least 30 have the printed end time too."""
+    """All 33 cells have the printed letter, and at least 30 cells have the printed end time."""
     marks = Counter()
     for cell in CELLS:
         if cell.table == "I":

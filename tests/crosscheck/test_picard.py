@@ -29,7 +29,7 @@ def test_panels_reach_rounding_error_over_many_periods():
 
 def test_threads_that_share_a_solution_get_the_states_of_one_thread():
     """Eight threads evaluate one solution, as runs of a study do, and the derivative yields to another thread
-    at every call; the states are those of a solution of one thread, to the last bit."""
+    at every call. Their states equal the states of a solution in one thread, to the last bit."""
 
     def derivative(y):
         sleep(0)

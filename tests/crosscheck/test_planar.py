@@ -197,8 +197,8 @@ def test_swash_plate_lifts_a_pin_as_its_closed_form(name: str, bodies: tuple[str
 
 
 def test_ondsel_s_accelerations_of_a_plane_between_moving_bodies_are_left_out() -> None:
-    """They are wrong in OndselSolver; those of the slider-crank on a plane of the ground are given
-    (above)."""
+    """OndselSolver computes wrong accelerations there. The test above shows that the adapter gives
+    accelerations of a slider-crank on a plane of the ground."""
     scene, _ = swash_plate(("plate", "pin"))
     assert run_fine("ondsel", scene, TIMES[:2]).acceleration is None
 

@@ -75,7 +75,7 @@ def test_arrays_that_are_not_finite_are_named(bench):
 def test_engine_that_claims_single_precision_is_not_failed_for_it():
     """Velocities are rounded to single precision. An engine that claims double precision (2⁻⁵²) fails the
     checks of digits and of smoothness; for one that claims single precision (2⁻²³) the check of digits does
-    not apply, and that of smoothness passes."""
+    not apply, and the check of smoothness passes."""
     faulty = engine(DEFECTS["velocities rounded to single precision"])
     for claimed, digits, is_failed in ((2.0**-52, suite.FAIL, True), (2.0**-23, suite.OUTSIDE, False)):
         type(faulty).rounding = claimed

@@ -1,4 +1,4 @@
-"""Random loop mechanisms: mbref's initial accelerations / those of engines and of Gauss's principle."""
+"""Random loop mechanisms: initial accelerations of mbref, of engines and by Gauss's principle agree."""
 
 import functools
 from collections import Counter

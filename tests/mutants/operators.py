@@ -105,15 +105,15 @@ def places(root: Path, packages: Sequence[str], mutant: Mutant) -> dict[str, int
         for node in ast.walk(innermost)
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
     ]
+    if not names:
+        return {mutant.file: _bits(1, len(source.splitlines()))}
+    named = re.compile(rf"\b({'|'.join(names)})\b")
     found, module = {}, re.compile(rf"\b{re.sub(r'(/__init__)?[.]py$', '', mutant.file).split('/')[-1]}\b")
     for path in sorted(path for package in packages for path in (root / package).rglob("*.py")):
         name, text = path.relative_to(root).as_posix(), path.read_text()
         lines = text.splitlines() if name == mutant.file or module.search(text) else []
-        named = re.compile(rf"\b({'|'.join(names) or '.'})\b")
         at = [k for k, line in enumerate(lines, 1) if named.search(line)]
         found[name] = sum(1 << k for k in at)
-    if not names:
-        return {mutant.file: found[mutant.file]}
     found[mutant.file] &= ~_bits(innermost.lineno, innermost.end_lineno)
     return found
 
