@@ -115,3 +115,14 @@ def test_path_that_cannot_be_written_is_refused_and_nothing_is_written(path, tmp
         main(["draw", "four_bar", "--out", path])
     assert ended.value.code == 2 and "--out" in capsys.readouterr().err
     assert not [*Path().iterdir()]
+
+
+@pytest.mark.parametrize("place", ["mine.txt", "mine.txt/report"])
+def test_report_into_a_file_is_refused_before_it_runs_and_the_file_stays(place, tmp_path, capsys):
+    """--out names a file, or a folder inside of a file: a sentence says so."""
+    (tmp_path / "mine.txt").write_text("my own")
+    with pytest.raises(SystemExit) as ended:
+        crosscheck(["report", "four_bar", "--out", str(tmp_path / place)])
+    assert ended.value.code == 2
+    assert f"{tmp_path / 'mine.txt'} is a file; name a folder" in capsys.readouterr().err
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["my own"]
