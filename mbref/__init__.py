@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from mbref.input_error import InputError
     from mbref.method import Method, MethodError
     from mbref.motions.drawing.picture import still
+    from mbref.motions.drawing.plot import plot
     from mbref.motions.error_estimate import ErrorEstimate
     from mbref.motions.motion import Motion
     from mbref.motions.trajectory import Cost, Outcome, Trajectory
@@ -37,6 +38,7 @@ _PUBLIC = {  # module → its public names
     "input_error": ("InputError",),
     "method": ("Method", "MethodError"),
     "motions.drawing.picture": ("still",),
+    "motions.drawing.plot": ("plot",),
     "motions.error_estimate": ("ErrorEstimate",),
     "motions.motion": ("Motion",),
     "motions.trajectory": ("Cost", "Outcome", "Trajectory"),
@@ -72,6 +74,7 @@ __all__ = [
     "equilibria",
     "find_scene",
     "motion_of_mode",
+    "plot",
     "simulate",
     "still",
     "variants",

@@ -15,7 +15,7 @@ from mbref.motions.trajectory import Trajectory
 from mbref.scene import JointLoad, Scene
 from mbref.scene.joints import ANGLE, DISPLACEMENT
 
-# SI unit → its other units with their factors to SI
+# SI unit → other units in which columns are found by mistake, with their factors to SI
 KNOWN_UNITS: dict[str, dict[str, float]] = {
     "s": {"ms": 1e-3, "min": 60.0},
     "m": {"mm": 1e-3, "cm": 1e-2, "km": 1e3, "um": 1e-6, "in": 0.0254, "ft": 0.3048},
@@ -30,8 +30,6 @@ KNOWN_UNITS: dict[str, dict[str, float]] = {
     "J": {"mJ": 1e-3, "kJ": 1e3},
     "1": {},
 }
-UNITS = {"": 1.0} | {u: f for si, others in KNOWN_UNITS.items() for u, f in {si: 1.0, **others}.items()}
-DIMENSIONS = {unit: si for si, others in KNOWN_UNITS.items() for unit in (si, *others)}
 SI = {
     "time": "s",
     "position": "m",

@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.recorded.columns import DIMENSIONS, SI, UNITS, kind_of, names
+from crosscheck.recorded.columns import SI, kind_of, names
 from crosscheck.recorded.number_formats import half_units, number
 from mbref.scene import Scene, SceneError
+from mbref.scene.units import ATOMS, Unit, unit
 
 SHORT = {  # last part of a header → column of the scene
     **{a: f"position.{a}" for a in "xyz"},
@@ -165,21 +166,21 @@ def _place(where: str, headers: Sequence[str], name: str) -> int:
 
 def _factor(name: str, own: str, units: Sequence[str]) -> float:
     """Return the factor to SI, from the column's own unit or from the unit given for its quantity."""
-    dimension = SI["time" if name == "time" else kind_of(name)]
-    if own and own not in UNITS:
-        raise SceneError([f"column {name}: unknown unit {own!r}; known: {', '.join(filter(None, UNITS))}"])
-    fitting = [u for u in units if _dimension(u) == dimension]
-    unit = own or (fitting[-1] if fitting else "")
-    if unit and _dimension(unit) != dimension:
-        raise SceneError([f"column {name}: {unit!r} is not a unit of a quantity in {dimension}"])
-    return UNITS[unit]
+    si = SI["time" if name == "time" else kind_of(name)]
+    given = [_unit(own, f"column {name}: ")] if own else []
+    known = [*map(_unit, units), *given]
+    fitting = [each for each in known if each.dimension == unit(si).dimension]
+    if own and fitting[-1:] != given:
+        raise SceneError([f"column {name}: {own!r} is not a unit of a quantity in {si}"])
+    return float(fitting[-1].factor) if fitting else 1.0
 
 
-def _dimension(unit: str) -> str:
-    """Return the SI unit of a unit's quantity."""
-    if unit not in DIMENSIONS:
-        raise SceneError([f"unknown unit {unit!r}; known: {', '.join(filter(None, UNITS))}"])
-    return DIMENSIONS[unit]
+def _unit(text: str, where: str = "") -> Unit:
+    """Return a unit by its name; raises SceneError for an unknown one."""
+    try:
+        return unit(text)
+    except ValueError:
+        raise SceneError([f"{where}unknown unit {text!r}; known: {', '.join(ATOMS)}"]) from None
 
 
 def _numbers(rows: Sequence[Sequence[str]], count: int, path: Path) -> np.ndarray:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mbref.cli.output import QUANTITIES, body_table, console, progress_bar, rounded, warn
+from mbref.cli.output import STATE, body_table, console, progress_bar, rounded, warn
 from mbref.cli.request import MOST_STATES, add_method_options, add_scene, limits_of, sample_times
 from mbref.command_line import record_file, whole
 from mbref.input_error import InputError
@@ -92,7 +92,7 @@ def _show_spread(
 
     ``rate`` is the number of runs per second of wall time, including the start of the processes.
     """
-    last = {key: np.array([getattr(run, key)[-1] for run in completed]) for key in QUANTITIES.values()}
+    last = {key: np.array([getattr(run, key)[-1] for run in completed]) for key in STATE}
     if options.json:
         spread = {
             f"{what}_{key}": {body.name: a[b].tolist() for b, body in enumerate(scene.body)}

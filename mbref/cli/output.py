@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mbref.motions.outputs import UNIT_OF, quantity_of
+from mbref.motions.output_units import unit_of_column
 from mbref.scene import Scene
 from mbref.scene.slips import probable_slips
 from mbref.terminal import Console
@@ -21,14 +21,9 @@ if TYPE_CHECKING:
     from mbref.motions.motion import Motion
 
 PIPED_WIDTH = 80  # characters of a line without a terminal
-TIME = "s"
 HOUR = 3600.0  # s
 PAUSE = 10.0  # s between two progress lines if stderr is no terminal
-QUANTITIES = {  # column of a body in a table → field of a trajectory
-    "position, m": "position",
-    "velocity, m/s": "velocity",
-    "angular velocity, rad/s": "angular_velocity",
-}
+STATE = ("position", "velocity", "angular_velocity")  # of a body in a table; fields of a trajectory
 
 
 # columns in which numbers of the size of rounding errors are printed
@@ -60,9 +55,11 @@ def rounded(vector: np.ndarray) -> np.ndarray:
     return np.round(vector, 12) + 0.0
 
 
-def body_table(title: str, bodies: Sequence[str], cells: Callable[[int, str], Iterable[str]]) -> Table:
-    """Return a table with rows x, y, z of ``cells(body, field of QUANTITIES)`` for every body and
-    quantity."""
+def body_table(
+    title: str, bodies: Sequence[str], cells: Callable[[int, str], Iterable[str]], units: Sequence[str] = ()
+) -> Table:
+    """Return a table with rows x, y, z of ``cells(body, field of STATE)`` for every body and quantity,
+    in units."""
     from rich.table import Table
 
     table = Table(title=title)
@@ -71,21 +68,22 @@ def body_table(title: str, bodies: Sequence[str], cells: Callable[[int, str], It
     for axis in "xyz":
         table.add_column(axis, justify="right", no_wrap=True)
     for b, name in enumerate(bodies):
-        for k, (quantity, field) in enumerate(QUANTITIES.items()):
-            last = k == len(QUANTITIES) - 1
+        for k, field in enumerate(STATE):
+            quantity = f"{field.replace('_', ' ')}, {unit_of_column(field, units)[0]}"
+            last = k == len(STATE) - 1
             table.add_row("" if k else name, quantity, *cells(b, field), end_section=last)
     return table
 
 
-def column_table(columns: Mapping[str, np.ndarray]) -> Table:
+def column_table(columns: Mapping[str, np.ndarray], units: Sequence[str] = ()) -> Table:
     """Return a table with a column of numbers over time for each of the named columns (k,), time first."""
     from rich.table import Table
 
-    table = Table()
-    for name in columns:
-        unit = TIME if name == "time" else UNIT_OF[quantity_of(name)]
+    table, shown = Table(), []
+    for name, values in columns.items():
+        unit, size = unit_of_column(name, units)
         table.add_column(f"{name}\n{unit}", justify="right", overflow="fold")
-    shown = [values if name.endswith(SMALL_COLUMNS) else rounded(values) for name, values in columns.items()]
+        shown.append(values if name.endswith(SMALL_COLUMNS) else rounded(values) / size)
     for row in zip(*shown, strict=True):
         table.add_row(*(f"{x:.6g}" for x in row))
     return table

@@ -20,6 +20,7 @@ from mbref.method import (
     MethodError,
     default_method,
 )
+from mbref.motions.output_units import requested_units
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 from mbref.stabilisation import STABILISATIONS
@@ -59,6 +60,25 @@ def add_method_options(parser: argparse.ArgumentParser, json: bool = True) -> No
     parser.add_argument("--max-step", type=float, default=0.0, help="largest step, s (default: the duration)")
     if json:
         parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+
+
+def add_units(parser: argparse.ArgumentParser) -> None:
+    """Add --units."""
+    parser.add_argument(
+        "--units",
+        type=checked_units,
+        metavar="UNITS",
+        help='units of the output, e.g. mm,deg or kN,rpm (default: SI); "N mm" holds for moments only',
+    )
+
+
+def checked_units(text: str) -> str:
+    """Return units such as "mm,deg"; raises ArgumentTypeError for an unknown one."""
+    try:
+        requested_units(text)
+    except InputError as error:
+        raise argparse.ArgumentTypeError(str(error).removeprefix("units: ")) from None
+    return text
 
 
 def add_time_options(parser: argparse.ArgumentParser) -> None:

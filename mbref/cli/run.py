@@ -6,19 +6,23 @@ import argparse
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbref.cli.output import body_table, column_table, console, progress_bar, rounded
-from mbref.cli.request import add_method_options, add_scene, request_of
+from mbref.cli.request import add_method_options, add_scene, add_units, request_of
 from mbref.command_line import add_output
 from mbref.input_error import InputError
 from mbref.motions.motion import Motion
+from mbref.motions.output_units import requested_units, unit_of_column
 from mbref.motions.outputs import UNIT_OF
 from mbref.records import strict_json
 from mbref.scene import Scene
 from mbref.scene.bodies import DRIVER
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 # CPU seconds of a run below which its error is estimated by default, and limit of the second run
 ESTIMATE_SECONDS = 5.0
@@ -37,7 +41,7 @@ def add(commands: Any) -> None:
         "  mbref run four_bar --method mpi-svd+partitioning --duration 0.02 --json\n"
         "  mbref run mechanism.toml --method 'lm1+baumgarte[alpha=10,beta=10]/rk4[step=1e-4]'\n"
         "  mbref run four_bar --duration 0.1 --branch 2=2\n"
-        "  mbref run mechanism.toml --out run.csv\n"
+        "  mbref run mechanism.toml --out run.csv --units mm,deg --decimal-comma\n"
         '  mbref run spatial_slider_crank --samples 5 --columns slider.position "driver(A).torque"',
     )
     add_scene(run)
@@ -55,6 +59,17 @@ def add(commands: Any) -> None:
         default=[],
         help="print these numbers over time, and write only them to a .csv, such as rod.position energy;\n"
         "mbref list outputs prints their names",
+    )
+    add_units(run)
+    run.add_argument(
+        "--decimal-comma",
+        action="store_true",
+        help="write a .csv with decimal commas and ; between numbers, for spreadsheets that expect them",
+    )
+    run.add_argument(
+        "--maxima",
+        action="store_true",
+        help="print the largest force and moment of each joint among the samples, with their times",
     )
     run.add_argument(
         "--branch",
@@ -82,11 +97,11 @@ def _run(options: argparse.Namespace) -> int:
     )
     motion = _estimated(run.motion(check), options.estimate)
     if options.out:
-        write(motion, options.out, *options.columns)
+        write(motion, options)
     if options.json:
         print(strict_json({"scene": run.scene.name, "records": [motion.to_record()]}))
     else:
-        show(run.scene, motion, options.columns)
+        show(run.scene, motion, options.columns, requested_units(options.units or ""), options.maxima)
     return 0 if motion.outcome.name == "COMPLETED" else 1
 
 
@@ -112,13 +127,24 @@ def _branches(words: list[str]) -> dict[int, int]:
 
 def _writer(out: str | None) -> Any:
     """Return the writer for a file of that name; raises InputError for an unknown file suffix."""
-    writers = {".csv": Motion.to_csv, ".json": lambda motion, path, *_: motion.save(path)}
+    writers = {".csv": _write_table, ".json": lambda motion, options: motion.save(options.out)}
     if out is not None and Path(out).suffix not in writers:
         raise InputError(f"--out: must end in {' or '.join(writers)}, got {out!r}")
     return writers[Path(out).suffix] if out else None
 
 
-def show(scene: Scene, trajectory: Motion, columns: Sequence[str] = ()) -> None:
+def _write_table(motion: Motion, options: argparse.Namespace) -> None:
+    style = {"units": options.units, "decimal_comma": options.decimal_comma}
+    motion.to_csv(options.out, *options.columns, **style)
+
+
+def show(
+    scene: Scene,
+    trajectory: Motion,
+    columns: Sequence[str] = (),
+    units: Sequence[str] = (),
+    with_maxima: bool = False,
+) -> None:
     """Print the end of a run, its error estimate and cost, and its last state or the requested columns."""
     out, cost = console(), trajectory.cost
     out.print(f"{scene.name} by {trajectory.method}: {trajectory.outcome.name} at t = {trajectory.t_end:g} s")
@@ -136,17 +162,38 @@ def show(scene: Scene, trajectory: Motion, columns: Sequence[str] = ()) -> None:
         out.print(f"singular position {number} at t = {crossing.time:.6g} s: {crossing.sentence}, {taken}")
     if not trajectory.times.size:
         return
-    out.print("\n".join(_largest(trajectory)))
+    out.print("\n".join(_largest(trajectory, units)))
+    if with_maxima:
+        out.print(_maxima_table(trajectory, units))
     if columns:
-        out.print(column_table(trajectory.columns(*columns)))
+        out.print(column_table(trajectory.columns(*columns), units))
         for sentence in _undetermined(trajectory, columns):
             out.print(sentence)
         return
 
     def numbers(b: int, field: str) -> list[str]:
-        return [f"{x:.5g}" for x in rounded(getattr(trajectory, field)[-1, b])]
+        return [
+            f"{x:.5g}" for x in rounded(getattr(trajectory, field)[-1, b]) / unit_of_column(field, units)[1]
+        ]
 
-    out.print(body_table(f"state at t = {trajectory.times[-1]:g} s", trajectory.bodies, numbers))
+    out.print(body_table(f"state at t = {trajectory.times[-1]:g} s", trajectory.bodies, numbers, units))
+
+
+def _maxima_table(motion: Motion, units: Sequence[str]) -> Table:
+    """Return a table with the largest force and moment of each joint, their times, and open components."""
+    from rich.table import Table
+
+    quantities = ("force", "time", "moment", "time")
+    forms = [unit_of_column(quantity, units) for quantity in quantities]
+    table = Table(title="largest reactions among the samples")
+    table.add_column("joint", overflow="fold")
+    for quantity, (unit, _) in zip(quantities, forms, strict=True):
+        table.add_column(f"{quantity}\n{unit}", justify="right")
+    table.add_column("open", justify="right")
+    for name, found in motion.reaction_maxima().items():
+        values = rounded(np.array(found[:4])) / [size for _, size in forms]
+        table.add_row(name, *(f"{x:.6g}" for x in values), str(found.open))
+    return table
 
 
 def _undetermined(motion: Motion, columns: Sequence[str]) -> Iterator[str]:
@@ -161,7 +208,7 @@ def _undetermined(motion: Motion, columns: Sequence[str]) -> Iterator[str]:
             )
 
 
-def _largest(motion: Motion) -> Iterator[str]:
+def _largest(motion: Motion, units: Sequence[str]) -> Iterator[str]:
     """Yield sentences on the largest violations of constraint rows, and on the largest reaction with its
     joint and time."""
     levels = [
@@ -170,8 +217,8 @@ def _largest(motion: Motion) -> Iterator[str]:
         if rows is not None
     ]
     yield f"largest violation of a constraint row {', '.join(levels)}"
-    if motion.reactions:
-        sizes = {name: np.linalg.norm(wrench[:, :3], axis=1) for name, wrench in motion.reactions.items()}
-        name = max(sizes, key=lambda name: float(sizes[name].max()))
-        at = int(sizes[name].argmax())
-        yield f"largest reaction {sizes[name][at]:.5g} N in joint {name} at t = {motion.times[at]:.6g} s"
+    if maxima := motion.reaction_maxima():
+        name, found = max(maxima.items(), key=lambda item: item[1].force)
+        unit, size = unit_of_column("force", units)
+        at = f"in joint {name} at t = {found.force_time:.6g} s"
+        yield f"largest reaction {found.force / size:.5g} {unit} {at}"

@@ -37,12 +37,17 @@ def read_json(path: str | Path) -> tuple[Scene, Trajectory, ErrorEstimate | None
         raise InputError(f"{path}: is not a file that Motion.save wrote") from None
 
 
-def write_csv(path: str | Path, columns: Mapping[str, np.ndarray]) -> None:
-    """Write columns (k,) with all digits, below a line with their names."""
-    with replaced(path) as fresh, open(fresh, "w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
+def write_csv(path: str | Path, columns: Mapping[str, np.ndarray], decimal_comma: bool = False) -> None:
+    """Write columns (k,) with all digits, below a line with their names.
+
+    With decimal commas ``;`` stands between numbers, and a byte order mark lets spreadsheets read UTF-8.
+    """
+    encoding = "utf-8-sig" if decimal_comma else "utf-8"
+    with replaced(path) as fresh, open(fresh, "w", encoding=encoding, newline="") as file:
+        writer = csv.writer(file, delimiter=";" if decimal_comma else ",")
         writer.writerow(columns)
-        writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+        for row in zip(*(column.tolist() for column in columns.values()), strict=True):
+            writer.writerow([repr(x).replace(".", ",") for x in row] if decimal_comma else row)
 
 
 def dataframe(columns: Mapping[str, np.ndarray]) -> Any:
@@ -51,4 +56,4 @@ def dataframe(columns: Mapping[str, np.ndarray]) -> Any:
         import pandas
     except ImportError:
         raise ImportError("to_dataframe needs pandas: pip install pandas; columns() does not") from None
-    return pandas.DataFrame(columns).set_index("time")
+    return pandas.DataFrame(columns).set_index(next(iter(columns)))

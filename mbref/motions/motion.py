@@ -13,11 +13,14 @@ import numpy as np
 from mbref.motions.actuation import DriverMotion, LoadMotion, driver_motion, largest_force, load_motion
 from mbref.motions.constraints import Violation, determined_reactions, violations
 from mbref.motions.drawing.picture import moving, still
+from mbref.motions.drawing.plot import plot
 from mbref.motions.drawing.view import View
 from mbref.motions.energy import kinetic, potential
 from mbref.motions.error_estimate import ErrorEstimate
 from mbref.motions.files import dataframe, read_json, write_csv, write_json
 from mbref.motions.joint_motion import JointMotion, joint_motion
+from mbref.motions.maxima import ReactionMaxima, reaction_maxima
+from mbref.motions.output_units import in_units
 from mbref.motions.outputs import all_columns, chosen
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
@@ -136,7 +139,7 @@ class Motion(Trajectory):
         estimate = self.error_estimate
         return {**super().to_record(), "error_estimate": estimate and estimate.to_record()}
 
-    def columns(self, *names: str) -> dict[str, np.ndarray]:
+    def columns(self, *names: str, units: str | None = None) -> dict[str, np.ndarray]:
         """Return numbers over time as columns.
 
         Parameters
@@ -144,22 +147,43 @@ class Motion(Trajectory):
         *names : str
             Columns or their beginnings, such as ``"rod.position"`` or ``"driver(A).torque"``. Default: all.
             ``mbref list outputs`` prints the names.
+        units : str, optional
+            Units such as ``"mm,deg"``; other numbers are in SI units. Every name then has its unit, as
+            ``rod.position.x [mm]``; so ``""`` adds the SI units. Default: SI units, names without units.
 
         Returns
         -------
         dict of str to ndarray, shape (k,)
-            ``time``, ``rod.position.x``, ``A.angle``, ``energy`` and so on, in SI units.
+            ``time``, ``rod.position.x``, ``A.angle``, ``energy`` and so on.
 
         Raises
         ------
         InputError
-            If a name fits no column.
+            If a name fits no column, or a unit is unknown.
         """
         table = all_columns(self)
-        return {name: table[name] for name in ["time", *chosen(table, names)]} if names else table
+        found = {name: table[name] for name in ["time", *chosen(table, names)]} if names else table
+        return found if units is None else in_units(found, units)
 
-    def to_dataframe(self) -> Any:
-        """Return the columns as a pandas DataFrame, indexed by time.
+    def reaction_maxima(self) -> dict[str, ReactionMaxima]:
+        """Return the largest force and moment of each joint among the samples, with their times.
+
+        Returns
+        -------
+        dict of str to ReactionMaxima
+            By joint. Empty if a body has no mass, or without samples.
+        """
+        return reaction_maxima(self)
+
+    def to_dataframe(self, *names: str, units: str | None = None) -> Any:
+        """Return columns as a pandas DataFrame, indexed by time.
+
+        Parameters
+        ----------
+        *names : str
+            Columns or their beginnings, as for ``columns``, with its error. Default: all.
+        units : str, optional
+            Units, as for ``columns``.
 
         Returns
         -------
@@ -170,9 +194,11 @@ class Motion(Trajectory):
         ImportError
             If pandas is not installed.
         """
-        return dataframe(self.columns())
+        return dataframe(self.columns(*names, units=units))
 
-    def to_csv(self, path: str | Path, *names: str) -> None:
+    def to_csv(
+        self, path: str | Path, *names: str, units: str | None = None, decimal_comma: bool = False
+    ) -> None:
         """Write columns as CSV. The first line has their names, numbers have all digits.
 
         Parameters
@@ -181,8 +207,12 @@ class Motion(Trajectory):
             The file.
         *names : str
             Columns or their beginnings, as for ``columns``, with its error. Default: all.
+        units : str, optional
+            Units, as for ``columns``; the first line then has them.
+        decimal_comma : bool
+            Whether numbers have a decimal comma, and ``;`` stands between them.
         """
-        write_csv(path, self.columns(*names))
+        write_csv(path, self.columns(*names, units=units), decimal_comma)
 
     def save(self, path: str | Path) -> None:
         """Write scene and trajectory as one JSON object, which ``Motion.load`` reads.
@@ -216,26 +246,35 @@ class Motion(Trajectory):
         scene, trajectory, estimate = read_json(path)
         return replace(Motion.of(scene, trajectory), error_estimate=estimate)
 
-    def plot(self, *names: str) -> Any:
-        """Plot columns over time, one panel for each quantity.
+    def plot(
+        self, *names: str, over: str = "time", units: str = "", together: bool = False, ax: Any = None
+    ) -> Any:
+        """Plot columns over time, one panel for each quantity; ``mbref.plot`` with one motion.
 
         Parameters
         ----------
         *names : str
             Columns or their beginnings, such as ``"rod.position"``. Default: joint coordinates and energy.
+        over : str
+            Column of the horizontal axis, such as ``"A.angle"`` of a driven joint. Default: time.
+        units : str
+            Units such as ``"mm,deg"``. Default: SI.
+        together : bool
+            Whether all columns of one unit share a panel.
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw in, for columns of one panel. Default: a new figure.
 
         Returns
         -------
-        matplotlib.figure.Figure
+        matplotlib.figure.Figure or matplotlib.axes.Axes
+            The new figure, or ``ax``.
 
         Raises
         ------
         InputError, ImportError
             If a name fits no column, or matplotlib is not installed.
         """
-        from mbref.motions.drawing.plot import plot
-
-        return plot(self.columns(), names)
+        return plot(self, *names, over=over, units=units, together=together, ax=ax)
 
     def picture(self, view: str | None = None) -> str:
         """Return the moving mechanism as the text of an animated SVG.

@@ -3,12 +3,28 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from mbref.scene.fields import Mass, Measures, Name, PointValue, Quaternion, SceneEntry, VectorValue, as_list
+from mbref.scene.fields import (
+    AngularSpeed,
+    Density,
+    Mass,
+    Measures,
+    Name,
+    PointValue,
+    Quaternion,
+    SceneEntry,
+    Speed,
+    Three,
+    VectorValue,
+    as_list,
+    checked_mass,
+)
 from mbref.scene.functions import TimeFunction
+from mbref.scene.shapes import Solid
+from mbref.scene.units import number_in
 from mbref.scene.validation import checked_inertia
 
 DRIVER = "driver({})"  # name of the driver of a joint in columns and records
@@ -16,6 +32,8 @@ UNIT_TOLERANCE = 1e-6  # largest deviation of a quaternion from unit length that
 
 
 InertiaValue = tuple[float, float, float] | tuple[VectorValue, VectorValue, VectorValue] | None
+WrittenMoments = tuple[float | str, float | str, float | str]
+WrittenInertia = WrittenMoments | tuple[WrittenMoments, WrittenMoments, WrittenMoments] | None
 
 
 class Body(SceneEntry):
@@ -24,6 +42,8 @@ class Body(SceneEntry):
     ``inertia`` is about the centre of mass along the body axes: three principal moments or a symmetric 3x3
     (kg m²).  A kinematic analysis needs neither ``mass`` nor ``inertia``; a body has both or none of them.
     A body of mass 0 and inertia 0 is a massless link, whose motion follows from the bodies at its joints.
+    A ``shape`` with ``mass`` or ``density`` (kg/m³) of a homogeneous body gives both; a read body has numbers
+    in place of the shape.
     ``velocity`` and ``angular_velocity`` (world) are optional: omitted velocities are computed from the
     constraints and the given velocities.
     """
@@ -31,15 +51,17 @@ class Body(SceneEntry):
     name: Name
     mass: Mass | None = None
     inertia: InertiaValue = None
+    shape: Solid | None = None
+    density: Density | None = None
     position: PointValue
     orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
-    velocity: VectorValue | None = None
-    angular_velocity: VectorValue | None = None
+    velocity: Three[Speed] | None = None
+    angular_velocity: Three[AngularSpeed] | None = None
 
-    @field_validator("inertia", mode="plain", json_schema_input_type=InertiaValue)
+    @field_validator("inertia", mode="plain", json_schema_input_type=WrittenInertia)
     @classmethod
     def _inertia_is_physical(cls, value: Any) -> Any:
-        return None if value is None else checked_inertia(as_list(value))
+        return None if value is None else checked_inertia(_in_si(as_list(value)))
 
     @field_validator("orientation")
     @classmethod
@@ -48,6 +70,22 @@ class Body(SceneEntry):
         if abs(norm - 1) > UNIT_TOLERANCE:
             raise ValueError(f"must be a unit quaternion (w, x, y, z), got one of length {norm:.9g}")
         return q if abs(norm - 1) <= 1e-15 else tuple(x / norm for x in q)
+
+    @model_validator(mode="after")
+    def _numbers_replace_the_shape(self) -> Self:
+        if self.shape is None or self.inertia is not None or (self.mass is None) == (self.density is None):
+            return self  # no shape, or a fault that the scene reports
+        mass = self.mass or 0.0
+        if self.density is not None:
+            mass = checked_mass(self.density * self.shape.volume)
+        inertia = tuple(mass * moment for moment in self.shape.moments_over_mass)
+        self.__dict__.update(mass=mass, inertia=checked_inertia(inertia), shape=None, density=None)
+        return self
+
+
+def _in_si(value: Any) -> Any:
+    """Return moments of inertia, also in lists, in kg m²."""
+    return [*map(_in_si, value)] if isinstance(value, list | tuple) else number_in("inertia")(value)
 
 
 class Driver(TimeFunction):

@@ -6,12 +6,12 @@ import math
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from reprlib import Repr
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 from mbref.printable import checked_name
-from mbref.scene.units import angle, length, length_or_angle
+from mbref.scene.units import Quantity, number_in
 
 # limits of numbers, whose products and squares then stay within double precision
 LARGEST, SMALLEST = 1e40, 1e-40
@@ -116,25 +116,49 @@ def field_of(entry: Any, key: str) -> Any:
     return entry.get(key) if isinstance(entry, Mapping) else getattr(entry, key, None)
 
 
+def unit_of(*quantities: Quantity) -> BeforeValidator:
+    """Return the validator of a number that may have a unit of one of the quantities, or any unit."""
+    return BeforeValidator(number_in(*quantities), json_schema_input_type=float | str)
+
+
 Sized = AfterValidator(checked_size)
 Real = Annotated[float, Field(strict=True, allow_inf_nan=False), Sized]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0), AfterValidator(checked_length)]
-Mass = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0), AfterValidator(checked_mass)]
 NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0), Sized]
-VectorValue = Annotated[tuple[Real, Real, Real], BeforeValidator(as_list)]
+Light = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0), AfterValidator(checked_mass)]
+Number = TypeVar("Number")
+Three = Annotated[tuple[Number, Number, Number], BeforeValidator(as_list)]
+VectorValue = Three[Real]
 Quaternion = Annotated[tuple[Real, Real, Real, Real], BeforeValidator(as_list)]
 Name = Annotated[str, Field(min_length=1, max_length=MOST_CHARACTERS), AfterValidator(checked_name)]
 Pair = tuple[Name, Name]
 VectorPair = Annotated[tuple[VectorValue, VectorValue], BeforeValidator(as_list)]
 Reals = Annotated[tuple[Real, ...], Field(min_length=1), BeforeValidator(as_list)]
 
-
-Length = Annotated[Real, BeforeValidator(length, json_schema_input_type=float | str)]  # m, or "300 mm"
-Angle = Annotated[Real, BeforeValidator(angle, json_schema_input_type=float | str)]  # rad, or "30 deg"
-LengthOrAngle = Annotated[Real, BeforeValidator(length_or_angle, json_schema_input_type=float | str)]
-Measures = Annotated[tuple[LengthOrAngle, ...], Field(min_length=1), BeforeValidator(as_list)]
-Extent = Annotated[NotNegative, BeforeValidator(length, json_schema_input_type=float | str)]
-PointValue = Annotated[tuple[Length, Length, Length], BeforeValidator(as_list)]
+# numbers in SI units, or texts such as "300 mm"
+Length = Annotated[Real, unit_of("length")]
+Extent = Annotated[NotNegative, unit_of("length")]
+PositiveLength = Annotated[Positive, unit_of("length")]
+Angle = Annotated[Real, unit_of("angle")]
+LengthOrAngle = Annotated[Real, unit_of("length", "angle")]
+Measure = Annotated[Real, unit_of()]  # of the coordinate that the entry names, which checks the unit
+Measures = Annotated[tuple[Measure, ...], Field(min_length=1), BeforeValidator(as_list)]
+Mass = Annotated[Light, unit_of("mass")]
+Density = Annotated[Positive, unit_of("density")]
+Speed = Annotated[Real, unit_of("velocity")]
+AngularSpeed = Annotated[Real, unit_of("angular velocity")]
+Acceleration = Annotated[Real, unit_of("acceleration")]
+ForceSize = Annotated[Real, unit_of("force")]
+MomentSize = Annotated[Real, unit_of("moment")]
+Stiffness = Annotated[NotNegative, unit_of("stiffness")]
+Damping = Annotated[NotNegative, unit_of("damping")]
+TorsionalStiffness = Annotated[NotNegative, unit_of("torsional stiffness")]
+TorsionalDamping = Annotated[NotNegative, unit_of("torsional damping")]
+RotorInertia = Annotated[NotNegative, unit_of("inertia")]
+RotorMass = Annotated[NotNegative, unit_of("mass")]
+Time = Annotated[NotNegative, unit_of("time")]
+LaterTime = Annotated[Positive, unit_of("time")]
+PointValue = Three[Length]
 PointPair = Annotated[tuple[PointValue, PointValue], BeforeValidator(as_list)]
 
 

@@ -7,15 +7,20 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from mbref.scene.fields import LARGEST, field_of
-from mbref.scene.units import dimension_of, in_si
+from mbref.scene.joints import JOINT_TYPES
+from mbref.scene.units import Quantity, dimension_of, fits, in_si
 
+QUANTITY_OF: dict[str, Quantity] = {"angle": "angle", "displacement": "length"}  # of a coordinate
 Faults = Iterator[tuple[str, str]]  # path and message
 
 
 def factor_faults(path: str, factor: Any, data: Mapping[str, Any]) -> Faults:
-    """Return the faults of a load's factor: an amplitude with a unit, or a table with a gap."""
-    if dimension_of(amplitude := field_of(field_of(factor, "sine"), "amplitude")) is not None:
-        yield f"{path}.sine.amplitude", f"multiplies the load, so it has no unit, got {amplitude!r}"
+    """Return the faults of a load's factor: a value with a unit, or a table with a gap."""
+    rows = enumerate(map(listed, listed(field_of(factor, "table"))))
+    values = [(f"table[{k}][1]", row[1]) for k, row in rows if len(row) == 2]
+    for field, value in [("sine.amplitude", field_of(field_of(factor, "sine"), "amplitude")), *values]:
+        if not fits(value, None):
+            yield f"{path}.{field}", f"multiplies the load, so it has no unit, got {value!r}"
     start, stop = _number(field_of(factor, "start")), _number(field_of(factor, "stop")) or math.inf
     yield from table_faults(f"{path}.table", factor, data, start, stop)
 
@@ -32,11 +37,32 @@ def table_faults(path: str, function: Any, data: Mapping[str, Any], start: float
         yield path, f"leaves a gap: its last row is at {rows[-1][0]:g} s, but it acts until {end:g} s"
 
 
+def unit_faults(path: str, driver: Any, joint: Any) -> Faults:
+    """Yield faults of units that do not fit the coordinate that a driver prescribes."""
+    driven = JOINT_TYPES[joint].facts.driven if joint in JOINT_TYPES else None
+    quantity = QUANTITY_OF.get(str(driven))
+    found = [("sine.amplitude", field_of(field_of(driver, "sine"), "amplitude"), 0)]
+    found += [(f"polynomial[{k}]", term, k) for k, term in enumerate(listed(field_of(driver, "polynomial")))]
+    rows = enumerate(map(listed, listed(field_of(driver, "table"))))
+    found += [(f"table[{k}][1]", row[1], 0) for k, row in rows if len(row) == 2]
+    for field, value, power in found:
+        if quantity and not fits(value, quantity, power):
+            over = f", also over s^{power}" * bool(power)
+            yield (
+                f"{path}.{field}",
+                f"prescribes the {driven} of a {joint} joint, a unit of {quantity}{over}, got {value!r}",
+            )
+
+
+def listed(value: Any) -> list[Any]:
+    """Return a list or tuple as a list; an empty one for any other value."""
+    return list(value) if isinstance(value, list | tuple) else []
+
+
 def rows_of(function: Any) -> list[tuple[float, float]]:
     """Return the rows of a table; no rows if a row is faulty."""
-    table = field_of(function, "table")
-    given = list(table) if isinstance(table, list | tuple) else []
-    rows = [tuple(row) for row in given if isinstance(row, list | tuple) and len(row) == 2]
+    given = listed(field_of(function, "table"))
+    rows = [tuple(map(_si, row)) for row in given if isinstance(row, list | tuple) and len(row) == 2]
     numbers = all(isinstance(x, int | float) for row in rows for x in row)
     return rows if numbers and len(rows) == len(given) else []
 
@@ -44,6 +70,10 @@ def rows_of(function: Any) -> list[tuple[float, float]]:
 def _number(value: Any) -> float:
     """Return a number that a scene can contain; 0 for any other value, which is reported as a fault of its
     field."""
-    if dimension := dimension_of(value):
-        value = in_si(value, dimension)
+    value = _si(value)
     return float(value) if isinstance(value, int | float) and abs(value) <= LARGEST else 0.0
+
+
+def _si(value: Any) -> Any:
+    """Return a number with a unit in SI units; every other value as it is."""
+    return in_si(value) if dimension_of(value) else value

@@ -14,11 +14,23 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import BeforeValidator, field_validator
 
-from mbref.scene.fields import Angle, LengthOrAngle, NotNegative, Positive, Real, Reals, SceneEntry, as_list
+from mbref.scene.fields import (
+    Angle,
+    AngularSpeed,
+    LaterTime,
+    LengthOrAngle,
+    Measure,
+    Real,
+    Reals,
+    SceneEntry,
+    Time,
+    as_list,
+    unit_of,
+)
 
 FEWEST_ROWS = 4  # least number of rows of a table; four rows determine a cubic polynomial
 
-Row = tuple[Real, Real]
+Row = tuple[Annotated[Real, unit_of("time")], Measure]
 Table = Annotated[tuple[Row, ...], BeforeValidator(as_list)]
 Cubic = tuple[float, float, float, float]
 ZEROS: Cubic = (0.0, 0.0, 0.0, 0.0)
@@ -28,7 +40,7 @@ class Sine(SceneEntry):
     """amplitude · sin(frequency · t + phase); frequency in rad/s."""
 
     amplitude: LengthOrAngle = 0.0
-    frequency: Real = 1.0
+    frequency: AngularSpeed = 1.0
     phase: Angle = 0.0
 
 
@@ -126,8 +138,8 @@ class Factor(TimeFunction):
     """
 
     polynomial: Reals | None = None
-    start: NotNegative = 0.0
-    stop: Positive | None = None
+    start: Time = 0.0
+    stop: LaterTime | None = None
 
     @field_validator("stop")
     @classmethod

@@ -11,12 +11,13 @@ from pydantic import Discriminator, field_validator
 
 from mbref.scene.fields import (
     LengthOrAngle,
+    Measure,
     Name,
-    NotNegative,
     Pair,
     PointPair,
     PointValue,
-    Real,
+    RotorInertia,
+    RotorMass,
     SceneEntry,
     VectorPair,
     VectorValue,
@@ -128,8 +129,8 @@ class _AxisJoint(_AnchorJoint):
         return (self.axis,)
 
 
-class _DrivenJoint(_AxisJoint):
-    armature: NotNegative = 0.0  # kg m² or kg, of the driven coordinate q: the kinetic energy ½ armature q'²
+class _TurningJoint(_AxisJoint):
+    armature: RotorInertia = 0.0  # kg m², of the driven angle q: the kinetic energy ½ armature q'²
 
 
 class Fixed(_AnchorJoint):
@@ -139,7 +140,7 @@ class Fixed(_AnchorJoint):
     type: Literal["fixed"] = "fixed"
 
 
-class Revolute(_DrivenJoint):
+class Revolute(_TurningJoint):
     """Rotation about ``axis`` through ``anchor``; ``armature`` is the reflected inertia of a rotor."""
 
     facts = JointFacts((X, Y, Z), (X, Y), driven="angle", loaded=(ANGLE,))
@@ -184,14 +185,15 @@ class Spherical(_AnchorJoint):
     type: Literal["spherical"] = "spherical"
 
 
-class Translational(_DrivenJoint):
+class Translational(_AxisJoint):
     """Displacement along ``axis``, no rotation; ``armature`` is the reflected mass of a motor."""
 
     facts = JointFacts((X, Y), (X, Y, Z), driven="displacement", loaded=(DISPLACEMENT,))
     type: Literal["translational"] = "translational"
+    armature: RotorMass = 0.0
 
 
-class Cylindrical(_DrivenJoint):
+class Cylindrical(_TurningJoint):
     """Displacement along and rotation about ``axis``; ``armature`` is of the rotation."""
 
     facts = JointFacts((X, Y), (X, Y), driven="angle", loaded=(ANGLE, DISPLACEMENT))
@@ -252,7 +254,7 @@ class Coupling(SceneEntry):
 
     name: Name
     joints: Pair
-    ratio: Real  # rad/rad, m/rad, rad/m or m/m
+    ratio: Measure  # rad/rad, m/rad, rad/m or m/m
     offset: LengthOrAngle = 0.0  # rad or m, of the second coordinate
     coordinates: CoordinatePair | None = None
 

@@ -8,16 +8,20 @@ from pydantic import Discriminator, ValidationInfo, field_validator
 
 from mbref.scene.fields import (
     Angle,
+    Damping,
     Extent,
+    ForceSize,
     Length,
+    MomentSize,
     Name,
-    NotNegative,
     Pair,
     PointPair,
     PointValue,
-    Real,
     SceneEntry,
-    VectorValue,
+    Stiffness,
+    Three,
+    TorsionalDamping,
+    TorsionalStiffness,
 )
 from mbref.scene.functions import Factor
 from mbref.scene.joints import ANGLE, DISPLACEMENT, Coordinate
@@ -46,7 +50,7 @@ class Moment(LoadEntry):
     acts_on = "body"
     type: Literal["moment"] = "moment"
     body: Name
-    moment: VectorValue
+    moment: Three[MomentSize]
     factor: Factor | None = None
 
 
@@ -57,7 +61,7 @@ class Force(LoadEntry):
     type: Literal["force"] = "force"
     body: Name
     point: PointValue
-    force: VectorValue
+    force: Three[ForceSize]
     factor: Factor | None = None
 
 
@@ -68,8 +72,8 @@ class Spring(LoadEntry):
     type: Literal["spring"] = "spring"
     bodies: Pair
     points: PointPair
-    stiffness: NotNegative
-    damping: NotNegative = 0.0
+    stiffness: Stiffness
+    damping: Damping = 0.0
     natural_length: Extent
 
     @field_validator("natural_length")
@@ -114,8 +118,8 @@ class TorsionSpring(JointLoad):
 
     coordinate = ANGLE
     type: Literal["torsion_spring"] = "torsion_spring"
-    stiffness: NotNegative
-    damping: NotNegative = 0.0
+    stiffness: TorsionalStiffness
+    damping: TorsionalDamping = 0.0
     natural_angle: Angle = 0.0
 
 
@@ -124,8 +128,8 @@ class SlideSpring(JointLoad):
 
     coordinate = DISPLACEMENT
     type: Literal["slide_spring"] = "slide_spring"
-    stiffness: NotNegative
-    damping: NotNegative = 0.0
+    stiffness: Stiffness
+    damping: Damping = 0.0
     natural_displacement: Length = 0.0
 
 
@@ -134,7 +138,7 @@ class JointTorque(JointLoad):
 
     coordinate = ANGLE
     type: Literal["joint_torque"] = "joint_torque"
-    torque: Real
+    torque: MomentSize
     factor: Factor | None = None
 
 
@@ -143,7 +147,7 @@ class JointForce(JointLoad):
 
     coordinate = DISPLACEMENT
     type: Literal["joint_force"] = "joint_force"
-    force: Real
+    force: ForceSize
     factor: Factor | None = None
 
 

@@ -10,7 +10,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from mbref.files import write
 from mbref.scene.bodies import Body, Driver
-from mbref.scene.fields import Name, Positive, SceneEntry, VectorValue
+from mbref.scene.fields import Acceleration, LaterTime, Name, SceneEntry, Three
 from mbref.scene.functions import Factor, Sine
 from mbref.scene.joints import Coordinate, Coupling, Joint
 from mbref.scene.loads import Load
@@ -48,8 +48,8 @@ class Scene(SceneEntry):
     """
 
     name: Name
-    gravity: VectorValue = (0.0, 0.0, 0.0)
-    duration: Positive = 1.0
+    gravity: Three[Acceleration] = (0.0, 0.0, 0.0)
+    duration: LaterTime = 1.0
     ground: Literal["frame", "body"] = "frame"
     body: Annotated[tuple[Body, ...], Field(min_length=1)]
     joint: tuple[Joint, ...] = ()

@@ -12,10 +12,11 @@ from pydantic import ValidationError
 
 from mbref.printable import printable
 from mbref.scene.fields import checked_length, checked_size, field_of, is_some, meant, shown
-from mbref.scene.function_faults import Faults, factor_faults, table_faults
+from mbref.scene.function_faults import QUANTITY_OF, Faults, factor_faults, listed, table_faults, unit_faults
 from mbref.scene.joints import JOINT_TYPES, Coordinate, default_coordinates
 from mbref.scene.loads import LOAD_TYPES, JointLoad
-from mbref.scene.units import dimension_of
+from mbref.scene.shapes import SHAPE_TYPES
+from mbref.scene.units import QUANTITIES, dimension_of, fits, unit
 
 GROUND = "ground"
 RESERVED = (GROUND, "the fixed frame")  # names that no body can have
@@ -27,7 +28,6 @@ LOADED = {  # load type → joint types along whose coordinate it can act
 }
 COUPLED = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.coordinates)
 COORDINATES = get_args(Coordinate)
-DIMENSIONS = {"angle": "angle", "displacement": "length"}  # coordinate → dimension of its unit
 ACTS_ON = {name: load.acts_on for name, load in LOAD_TYPES.items()}
 NUMBERS = {  # field → content of its list; all other lists contain three numbers
     "orientation": "four numbers (w, x, y, z), for an angle φ about z cos(φ/2), 0, 0, sin(φ/2)",
@@ -132,7 +132,7 @@ def _must_hold(location: Sequence[str | int], got: str) -> str:
 def _meant_field(location: Sequence[str | int], tables: Mapping[str, Sequence[str]]) -> str:
     """Return the suggestion for an unknown field at a location such as ("joint", 0, "revolute", "axsi")."""
     key, above = str(location[-1]), [part for part in location[:-1] if isinstance(part, str)]
-    types: dict[str, Any] = {**JOINT_TYPES, **LOAD_TYPES}
+    types: dict[str, Any] = {**JOINT_TYPES, **LOAD_TYPES, **SHAPE_TYPES}
     table = above[-1] if above else ""
     known = types[table].model_fields if table in types else tables.get(table, ())
     return meant(key, known) or f"; known: {', '.join(known)}"
@@ -153,32 +153,27 @@ def _own_name(data: Mapping[str, Any], key: str, place: int) -> str:
     text."""
     names = [_text(entry, "joint" if key == "driver" else "name") for entry in _entries(data, key)]
     name = names[place] if place < len(names) else ""
-    fit = (
-        name
-        and names.count(name) == 1
-        and not name.isdigit()
-        and not set(name) & set("[]")
-        and len(name) < 80
-        and name.isprintable()
-    )
-    return name if fit else ""
+    fits_a_path = not name.isdigit() and not set(name) & set("[]") and len(name) < 80 and name.isprintable()
+    return name if fits_a_path and names.count(name) == 1 else ""
 
 
 def _path(location: Sequence[str | int]) -> str:
-    """Return the path body[2].mass of a location, without the tag that a union of joint or load types
+    """Return the path body[2].mass of a location, without the tag that a union of joint, load or shape types
     adds."""
-    parts = list(location)
-    if len(parts) > 2 and parts[0] in ("joint", "load") and isinstance(parts[2], str):
-        del parts[2]
+    parts = [part for k, part in enumerate(location) if not _is_tag(location, k)]
     text = ""
     for part in parts:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
     return printable(text) or "scene"
 
 
+def _is_tag(location: Sequence[str | int], k: int) -> bool:
+    place = location[k - 1] == "shape" if k > 2 else k == 2 and location[0] in ("joint", "load")
+    return place and isinstance(location[k], str)
+
+
 def _entries(data: Mapping[str, Any], key: str) -> list[Any]:
-    value = data.get(key, ())
-    return list(value) if isinstance(value, list | tuple) else []
+    return listed(data.get(key, ()))
 
 
 def _text(entry: Any, key: str) -> str:
@@ -197,15 +192,7 @@ def reference_faults(data: Mapping[str, Any]) -> Faults:
     yield from _duplicates("body", _names(bodies), reserved=RESERVED)
     yield from _duplicates("joint", _names(joints), (GROUND,) if data.get("ground") == "body" else ())
     for i, body in enumerate(bodies):
-        mass, inertia = field_of(body, "mass"), field_of(body, "inertia")
-        if (mass is None) != (inertia is None):
-            missing = "inertia" if inertia is None else "mass"
-            yield (
-                f"body[{i}].{missing}",
-                "is missing; give mass and inertia, or neither (kinematics)",
-            )
-        elif mass == 0 and is_some(inertia):
-            yield f"body[{i}].mass", "is 0, but the inertia is not; a massless link has neither"
+        yield from _mass_faults(f"body[{i}]", body)
     known = {*_names(bodies), GROUND}
     for i, joint in enumerate(joints):
         yield from _pair_faults(f"joint[{i}].bodies", field_of(joint, "bodies"), known)
@@ -228,6 +215,25 @@ def reference_faults(data: Mapping[str, Any]) -> Faults:
                 f"load[{i}].joint", field_of(load, "joint"), types, LOADED[kind], f"carry a {kind}"
             )
         yield from factor_faults(f"load[{i}].factor", field_of(load, "factor"), data)
+
+
+def _mass_faults(path: str, body: Any) -> Faults:
+    """Yield mass, inertia, shape and density of a body that are missing, or contradict each other."""
+    mass, inertia, shape, density = (field_of(body, key) for key in ("mass", "inertia", "shape", "density"))
+    if shape is None and density is not None:
+        yield f"{path}.shape", "is missing; a density needs a shape"
+    elif shape is not None and inertia is not None:
+        yield f"{path}.inertia", "follows from the shape; give one of them"
+    elif shape is not None and (mass is None) == (density is None):
+        wrong = "is missing; a shape needs mass or density" if mass is None else "or density, not both"
+        yield f"{path}.mass", wrong
+    elif density is not None and field_of(shape, "type") == "rod":
+        yield f"{path}.density", "needs a volume, which a thin rod has not; give its mass, or use a cylinder"
+    elif shape is None and (mass is None) != (inertia is None):
+        missing = "inertia" if inertia is None else "mass"
+        yield f"{path}.{missing}", "is missing; give mass and inertia, or neither (kinematics)"
+    elif mass == 0 and is_some(inertia):
+        yield f"{path}.mass", "is 0, but the inertia is not; a massless link has neither"
 
 
 def _coupling_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
@@ -260,9 +266,18 @@ def _coordinate_faults(path: str, coupling: Any, names: Sequence[str], types: Ma
             return
     if names[0] == names[1] and chosen[0] == chosen[1]:
         yield path, f"must be two different coordinates, got the {chosen[0]} of {names[0]!r} twice"
-    offset = field_of(coupling, "offset")
-    if dimension_of(offset) not in (None, DIMENSIONS.get(chosen[1], dimension_of(offset))):
-        yield f"{path.removesuffix('joints')}offset", f"is of the {chosen[1]} of {names[1]!r}, got {offset!r}"
+    if not set(chosen) <= set(COORDINATES):
+        return  # already reported as a fault of the field
+    entry, offset, ratio = (
+        path.removesuffix("joints"),
+        field_of(coupling, "offset"),
+        field_of(coupling, "ratio"),
+    )
+    if not fits(offset, QUANTITY_OF[chosen[1]]):
+        yield f"{entry}offset", f"is of the {chosen[1]} of {names[1]!r}, got {offset!r}"
+    first_unit, second_unit = (QUANTITIES[QUANTITY_OF[coordinate]][0] for coordinate in chosen)
+    if dimension_of(ratio) not in (None, unit(f"{second_unit}/{first_unit}").dimension):
+        yield f"{entry}ratio", f"is in {second_unit}/{first_unit}, got {ratio!r}"
 
 
 def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
@@ -275,20 +290,8 @@ def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
             if name in driven:
                 yield f"driver[{i}].joint", f"{name!r} already has a driver"
             driven.add(name)
-            yield from _unit_faults(f"driver[{i}]", driver, types.get(name))
+            yield from unit_faults(f"driver[{i}]", driver, types.get(name))
         yield from table_faults(f"driver[{i}].table", driver, data, 0.0, math.inf)
-
-
-def _unit_faults(path: str, driver: Any, joint: Any) -> Faults:
-    """Yield faults of units that do not fit the coordinate that a driver prescribes."""
-    driven = JOINT_TYPES[joint].facts.driven if joint in JOINT_TYPES else None
-    needed = DIMENSIONS.get(str(driven))
-    terms, sine = field_of(driver, "polynomial"), field_of(field_of(driver, "sine"), "amplitude")
-    found = {f"polynomial[{k}]": c for k, c in enumerate(terms if isinstance(terms, list | tuple) else ())}
-    for field, value in (found | {"sine.amplitude": sine}).items():
-        if needed and dimension_of(value) not in (None, needed):
-            text = f"prescribes the {driven} of a {joint} joint, a unit of {needed}, got {value!r}"
-            yield f"{path}.{field}", text
 
 
 def _duplicates(key: str, names: Sequence[str], reserved: Sequence[str] = ()) -> Faults:

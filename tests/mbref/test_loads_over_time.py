@@ -74,21 +74,6 @@ def test_table_is_a_twice_differentiable_spline_through_its_rows():
         assert second[0] == pytest.approx(second[1], abs=1e-9)  # 1/s²; rounding 1e-16 over (0.05 s)² is 4e-14
 
 
-def test_outputs_of_joint_loads_are_force_or_torque_and_joint_coordinates():
-    """Load 0 is a joint force of 2 N times a table, load 2 a joint torque of -0.3 N m, and load 1 a spring of
-    30 N/m with a damper of 0.7 N s/m along joint C, relaxed at 0.05 m."""
-    motion = run(scenes.arm(), "taylor")
-    names = list(motion.columns("load(0)"))
-    assert names == [
-        "time",
-        *(f"load(0).{n}" for n in ("force", "displacement", "displacement_rate", "power")),
-    ]
-    assert np.allclose(motion.load_at(0).force, 2.0 * Factor(table=WAVY).values(TIMES))
-    assert np.allclose(motion.load_at(2).torque, -0.3)
-    spring, joint = motion.load_at(1), motion.joint("C")
-    assert np.allclose(spring.force, -30.0 * (joint.displacement - 0.05) - 0.7 * joint.displacement_rate)
-
-
 def test_equilibrium_of_a_load_over_time_is_refused():
     with pytest.raises(SceneError, match=r"load\[0\].factor: varies"):
         mbref.equilibria(scenes.wheel())
@@ -140,9 +125,3 @@ def test_table_of_a_driver_must_begin_at_zero():
 def test_force_along_a_joint_that_does_not_slide_is_refused():
     with pytest.raises(SceneError, match="only translational, cylindrical joints can carry a joint_force"):
         scenes.wheel().with_(load=[JointForce(joint="J", force=1.0)])
-
-
-def test_saved_scene_keeps_functions_of_time(tmp_path):
-    for scene in (scenes.arm(), scenes.driven_arm()):
-        scene.save(tmp_path / "arm.toml")
-        assert Scene.from_file(tmp_path / "arm.toml") == scene

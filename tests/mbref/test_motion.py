@@ -149,26 +149,6 @@ def test_plot_of_an_unknown_column_suggests_a_known_one(crank):
             crank.plot(misspelt)
 
 
-def test_panel_of_a_plot_is_labelled_with_its_quantity_and_unit(crank):
-    quantities = ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
-    names = [f"rod.{quantity}.x" for quantity in quantities]
-    names += ["rod.orientation.w", "A.angle", "A.rate", "D.displacement", "A.force.x", "A.moment.z", "energy"]
-    assert [axes.get_ylabel() for axes in crank.plot(*names).axes] == [
-        "position, m",
-        "velocity, m/s",
-        "angular velocity, rad/s",
-        "acceleration, m/s²",
-        "angular acceleration, rad/s²",
-        "orientation",
-        "angle, rad",
-        "rate, rad/s",
-        "displacement, m",
-        "force, N",
-        "moment, N m",
-        "energy, J",
-    ]
-
-
 def test_plot_without_columns_shows_joint_coordinates_and_energy(crank):
     """``grouped`` returns the columns of each panel, by its quantity."""
     groups = grouped(list(crank.columns())[1:], ())

@@ -169,16 +169,6 @@ def test_offset_that_no_pose_obeys_is_refused():
         mbref.simulate(scene)
 
 
-def test_offset_has_the_unit_of_the_second_coordinate(tmp_path):
-    text = shifted(rack, "teeth", "5 mm")
-    assert text.coupling[0].offset == 0.005
-    assert shifted(gear_pair, "teeth", "30 deg").coupling[0].offset == pytest.approx(np.pi / 6)
-    with pytest.raises(SceneError, match=r"coupling\[teeth\].offset: is of the angle of 'B', got '5 mm'"):
-        shifted(gear_pair, "teeth", "5 mm")
-    text.save(tmp_path / "rack.toml")
-    assert Scene.from_file(tmp_path / "rack.toml") == text
-
-
 def test_every_scene_of_an_ensemble_starts_at_its_own_offset():
     """Runs of three scenes together equal single runs to the bit."""
     scenes = [shifted(gear_pair, "teeth", offset).with_(duration=0.5) for offset in (0.0, 0.1, 0.2)]

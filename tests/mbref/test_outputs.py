@@ -62,21 +62,6 @@ def sprung() -> Motion:
     return simulate(pendulum(load=SPRINGS), times=TIMES)
 
 
-@pytest.mark.parametrize(
-    ("bodies", "z", "sense"),
-    [(("ground", "rod"), 2.0, 1), (("ground", "rod"), -1.0, -1), (("rod", "ground"), 1.0, -1)],
-)
-def test_torque_of_a_driver_is_the_moment_that_the_pendulum_needs(bodies, z, sense):
-    """J θ'' + m g l cos θ acts on the rod about z, and its power is that times θ'. ``sense`` is the sign of θ
-    for the driver's: -1 for an axis along -z, or if the rod is the joint's first body."""
-    motion = simulate(pendulum(bodies, (0.0, 0.0, z)), times=TIMES)
-    theta, rate, acceleration = (sense * x for x in angle(TIMES))
-    torque = (INERTIA + MASS * ARM**2) * acceleration + MASS * G * ARM * np.cos(theta)
-    found = motion.driver("A")
-    assert np.allclose(found.torque, sense * torque, atol=ACCURACY) and found.force is None
-    assert np.allclose(found.power, torque * rate, atol=ACCURACY)
-
-
 def test_length_rate_and_force_of_a_spring_follow_from_geometry(sprung):
     """The law of cosines between the post and the tip of the rod."""
     theta, turning, _ = angle(TIMES)
@@ -161,20 +146,6 @@ def test_only_in_plane_reactions_of_a_planar_four_bar_are_determined(capsys, tmp
     scene.save(tmp_path / "plane.toml")
     assert main(["diagnose", str(tmp_path / "plane.toml"), "--start"]) == 0
     assert "determined          force x, force y, moment z of A, B, C, D" in capsys.readouterr().out
-
-
-def test_largest_reaction_is_the_largest_force_of_any_joint(sprung):
-    """At each sample, in a scene with one joint and in one with four."""
-    assert np.allclose(sprung.largest_reaction, np.linalg.norm(sprung.joint("A").force, axis=1), rtol=1e-14)
-    motion = simulate("planar_slider_crank", times=TIMES[:3] / 10)
-    sizes = [np.linalg.norm(motion.joint(j.name).force, axis=1) for j in motion.mechanism.joint]
-    assert (motion.largest_reaction == np.max(sizes, axis=0)).all()
-
-
-def test_columns_of_a_driver_are_its_torque_power_and_open_components(sprung):
-    """In the order in which columns are requested, after the time."""
-    expected = ["time", "driver(A).torque", "driver(A).power", "driver(A).open", "energy"]
-    assert list(sprung.columns("driver(A)", "energy")) == expected
 
 
 def test_unavailable_column_is_refused_with_its_need_or_a_suggestion(sprung):

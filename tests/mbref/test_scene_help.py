@@ -6,7 +6,6 @@ import math
 from importlib.resources import files
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from mbref.cli import main
@@ -176,46 +175,6 @@ def test_driver_that_turns_more_than_a_hundred_radians_is_a_probable_slip(rate, 
     assert [slip[: len(beginning)] for slip in probable_slips(driven)] == [beginning] * slips
 
 
-def test_lengths_and_angles_with_units_equal_the_numbers_in_si(tmp_path):
-    """Places in mm and cm, a length in inches and an angle in degrees replace the numbers of an example; the
-    saved scene has numbers in m and rad only."""
-    plain = Scene.from_file(Path(__file__).parents[2] / "examples" / "door_closer.toml").to_dict()
-    with_units = json.loads(json.dumps(plain))
-    for body in with_units["body"]:
-        body["position"] = [f"{1000 * x!r} mm" for x in body["position"]]
-    for joint in with_units["joint"]:
-        if "anchor" in joint:
-            joint["anchor"] = [f"{100 * x!r} cm" for x in joint["anchor"]]
-    for load in with_units["load"]:
-        if load["type"] == "spring":
-            load["natural_length"] = f"{load['natural_length'] / 0.0254!r}in"
-        if "natural_angle" in load:
-            load["natural_angle"] = f"{math.degrees(load['natural_angle'])!r} deg"
-    read, right = Scene(**with_units), Scene(**plain)
-    for mine, other in zip((*read.body, *read.load), (*right.body, *right.load), strict=True):
-        for key, value in mine.model_dump().items():
-            other_value = getattr(other, key)
-            if isinstance(value, float) or key in ("position", "points"):
-                assert np.allclose(value, other_value, rtol=1e-14), key
-    assert all(
-        np.allclose(a.anchor_pair, b.anchor_pair) for a, b in zip(read.joint, right.joint, strict=True)
-    )
-    read.save(tmp_path / "read.toml")
-    assert "mm" not in (tmp_path / "read.toml").read_text()
-
-
-def test_amplitude_of_a_driver_has_the_unit_of_its_coordinate():
-    """30 degrees are π/6 rad; a length is refused for the angle of a hinge."""
-    scene = find_scene("four_bar")
-    swing = {"joint": "A", "sine": {"amplitude": "30 deg", "frequency": 2.0, "phase": "0 deg"}}
-    assert scene.with_(driver=(swing,)).driver[0].sine.amplitude == pytest.approx(math.pi / 6, rel=1e-15)
-    with pytest.raises(
-        SceneError,
-        match=r"driver\[A\]\.sine\.amplitude: prescribes the angle of a revolute joint.* got '30 mm'",
-    ):
-        scene.with_(driver=({**swing, "sine": {"amplitude": "30 mm"}},))
-
-
 @pytest.mark.parametrize(
     ("motion", "value"),
     [
@@ -228,15 +187,6 @@ def test_driver_that_does_not_begin_at_zero_is_refused_with_its_value_in_radians
     with pytest.raises(SceneError, match="must be 0, motion is measured from t = 0; got ") as caught:
         find_scene("four_bar").with_(driver=({"joint": "A", **motion},))
     assert f"{value:.6g}" in str(caught.value)
-
-
-def test_coefficients_of_a_driver_have_the_unit_of_its_coordinate():
-    """360 degrees (per s) are 2π rad (per s); a length is refused for the angle of a hinge."""
-    scene = find_scene("four_bar")
-    driver = scene.with_(driver=({"joint": "A", "polynomial": [0, "360 deg"]},)).driver[0]
-    assert driver.coefficients == (0.0, pytest.approx(2 * math.pi, rel=1e-15))
-    with pytest.raises(SceneError, match=r"driver\[A\]\.polynomial\[1\]: prescribes the angle .* got '5 mm'"):
-        scene.with_(driver=({"joint": "A", "polynomial": [0, "5 mm"]},))
 
 
 def test_orientation_in_degrees_is_refused_with_the_formula_of_the_quaternion():

@@ -1,0 +1,136 @@
+"""Outputs in requested units, largest reactions with their times, and plots over the angle of a driver."""
+
+import math
+
+import numpy as np
+import pytest
+
+import mbref
+from crosscheck.recorded.reading import read
+from mbref.cli import main
+from tests.helpers.parts import Z, joint
+
+MASS, RADIUS, RATE, G = 2.0, 0.25, 2 * math.pi, 9.81
+TIMES = np.linspace(0.0, 1.0, 9)
+SIZES = {  # unit of an output → its size in SI, by "mm,deg,kN,ms"
+    "ms": 1e-3,
+    "mm": 1e-3,
+    "mm/s": 1e-3,
+    "mm/s²": 1e-3,
+    "deg": math.pi / 180,
+    "deg/s": math.pi / 180,
+    "deg/s²": math.pi / 180,
+    "kN": 1e3,
+    "kN mm": 1.0,
+    "W": 1.0,
+    "J": 1.0,
+}
+
+
+def crank(rate=RATE):
+    """A mass on a crank that turns once a second, level at the start, in the plane of gravity."""
+    return mbref.Scene(
+        name="crank",
+        gravity=(0, -G, 0),
+        body=[{"name": "mass", "mass": MASS, "inertia": [0, 0, 0], "position": [RADIUS, 0, 0]}],
+        joint=[joint("A", "revolute", "ground", "mass", axis=Z)],
+        driver=[{"joint": "A", "polynomial": [0, rate]}],
+    )
+
+
+@pytest.fixture(scope="module")
+def motion():
+    return mbref.simulate(crank(), times=TIMES)
+
+
+def test_columns_in_other_units_are_the_same_quantities(motion):
+    """Torques follow from the units of force and length; powers and energies keep their own."""
+    plain, converted = motion.columns(), motion.columns(units="mm,deg,kN,ms")
+    assert len(plain) == len(converted)
+    for (name, values), (header, others) in zip(plain.items(), converted.items(), strict=True):
+        column, bracket, unit = header.removesuffix("]").partition(" [")
+        assert column == name
+        if "violation" not in name:  # of rows of several units
+            assert np.allclose(others * (SIZES[unit] if bracket else 1.0), values, rtol=1e-15, atol=0)
+    assert motion.columns("A.rate", units="rpm")["A.rate [rpm]"] == pytest.approx(60.0, rel=1e-13)
+    assert list(motion.columns("A.moment.z", units="N mm,m")) == ["time [s]", "A.moment.z [N mm]"]
+
+
+@pytest.mark.parametrize(
+    ("units", "message"),
+    [("mn", "'mn' is no unit"), ("mm,cm", "'mm' and 'cm' are units of one"), ("kg", "no number of a motion")],
+)
+def test_units_that_no_output_can_have_are_refused(motion, units, message, capsys):
+    with pytest.raises(mbref.InputError, match=f"units: .*{message}"):
+        motion.columns(units=units)
+    with pytest.raises(SystemExit, match="2"):
+        main(["run", "four_bar", "--units", units])
+    assert message in capsys.readouterr().err
+
+
+def test_spreadsheet_with_decimal_commas_is_read_as_the_same_motion(motion, tmp_path):
+    """The judge's reader takes units from the headers."""
+    motion.to_csv(tmp_path / "crank.csv", units="mm,deg,kN,ms", decimal_comma=True)
+    text = (tmp_path / "crank.csv").read_text(encoding="utf-8-sig").splitlines()
+    assert text[0].startswith("time [ms];mass.orientation.w;") and "." not in text[2]
+    recording = read(tmp_path / "crank.csv", crank(), {})
+    assert np.allclose(recording.times, TIMES, rtol=1e-15)
+    for name, values in recording.columns.items():
+        assert np.allclose(values, motion.columns()[name], rtol=1e-14, atol=0), name
+    assert {"mass.acceleration.y", "A.angle", "A.force.x", "driver(A).torque"} <= set(recording.columns)
+
+
+def test_largest_reaction_of_a_crank_is_at_the_bottom(motion, tmp_path, capsys):
+    """m (ω² r + g) after three quarters of a turn. The driver's torque m g r is largest where the crank is
+    level, also in the moment at the anchor."""
+    found = motion.reaction_maxima()["A"]
+    assert found.force == pytest.approx(MASS * (RATE**2 * RADIUS + G), rel=1e-12)
+    assert found.force_time == 0.75 and found.open == 0
+    assert found.moment == pytest.approx(MASS * G * RADIUS, rel=1e-12)
+    assert found.moment_time in (0.0, 0.5, 1.0)
+    crank().save(tmp_path / "crank.toml")
+    command = ["run", str(tmp_path / "crank.toml"), "--samples", "9", "--maxima", "--units", "N mm,mm,ms"]
+    assert main(command) == 0
+    shown = capsys.readouterr().out
+    assert f"{1000 * MASS * G * RADIUS:.6g}" in shown and f"{found.force:.6g} │  750 " in shown
+
+
+def test_plot_over_the_angle_of_a_driver_has_the_columns_as_curves(motion):
+    figure = motion.plot("mass.position", "A.angle", over="A.angle", units="mm,deg")
+    panel, lowest = figure.axes
+    assert lowest.get_xlabel() == "A.angle, deg" and panel.get_ylabel() == "position, mm"
+    assert np.allclose(panel.lines[1].get_xdata(), 360 * TIMES, atol=1e-9)
+    assert np.allclose(panel.lines[1].get_ydata(), 250 * np.sin(RATE * TIMES), atol=1e-9)
+
+
+def test_columns_of_one_unit_share_a_panel_on_request(motion):
+    assert [a.get_ylabel() for a in motion.plot("A.moment.z", "driver(A)", "A.rate").axes][:2] == [
+        "moment, N m",
+        "torque, N m",
+    ]
+    panels = motion.plot("A.moment.z", "driver(A).torque", "A.rate", together=True).axes
+    assert [a.get_ylabel() for a in panels] == ["N m", "rate, rad/s"]
+    assert len(panels[0].lines) == 2
+
+
+def test_several_motions_are_drawn_into_given_axes(motion):
+    """Curves that are there stay; a label stands behind the name of a column."""
+    from matplotlib.figure import Figure
+
+    slow = mbref.simulate(crank(rate=math.pi), times=TIMES)
+    ax = Figure().subplots()
+    ax.plot([0, 1], [0, 1], label="by hand")
+    assert mbref.plot({"60 rpm": motion, "30 rpm": slow}, "A.angle", ax=ax) is ax
+    names = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert names == ["by hand", "A.angle, 60 rpm", "A.angle, 30 rpm"]
+    assert np.allclose(ax.lines[2].get_ydata(), ax.lines[1].get_ydata() / 2)
+    with pytest.raises(mbref.InputError, match="ax: takes columns of one quantity"):
+        motion.plot("A.angle", "A.rate", ax=ax)
+    with pytest.raises(mbref.InputError, match="over: must be one column"):
+        motion.plot("A.angle", over="mass.position")
+
+
+def test_data_frame_has_the_requested_columns_in_units(motion):
+    frame = motion.to_dataframe("mass.position.x", units="mm")
+    assert list(frame.columns) == ["mass.position.x [mm]"] and frame.index.name == "time [s]"
+    assert np.allclose(frame["mass.position.x [mm]"], 250 * np.cos(RATE * TIMES), atol=1e-9)
