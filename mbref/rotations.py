@@ -27,7 +27,8 @@ DIAGONAL, TWICE = np.eye(3).ravel(), np.where(np.eye(3).ravel() > 0, -2.0, 2.0)
 def to_matrix(p: np.ndarray) -> np.ndarray:
     """Return rotation matrices (…, 3, 3) of unit quaternions (…, 4)."""
     p = np.asarray(p, dtype=float)
-    a, b, c, d = (p.take(which, axis=-1) for which in FACTOR_PLACES)
+    factors = p.take(FACTOR_PLACES, axis=-1)
+    a, b, c, d = (factors[..., k, :] for k in range(4))
     entries = DIAGONAL + TWICE * (a * b + PLUS * (c * d))
     return entries.reshape(*p.shape[:-1], 3, 3)
 

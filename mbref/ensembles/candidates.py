@@ -82,7 +82,7 @@ class Candidates(NamedTuple):
         scenes."""
         length, rounding = self.packs.length, run.method.settings(0.0).rounding
         return [
-            *parameters_of(memory.equations, run.reduced(self.packs.data, axis=1), self.packs),
+            *parameters_of(memory.equations, run.reduced(self.packs.data), self.packs),
             (memory.state.coordinates, self.q),
             (memory.state.velocities, self.v),
             (memory.control, largest_violation(run.limits, length), "violation"),

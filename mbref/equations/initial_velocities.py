@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -47,8 +48,8 @@ class Rates(NamedTuple):
 
 def speed_at_rest(scene: Scene, length: float) -> float:
     """Return the speed (m/s) up to which bodies of a scene of a length (m) are at rest."""
-    falling = np.sqrt(length * np.linalg.norm(scene.gravity))
-    return float(NO_MOTION * max(falling, length / scene.duration))
+    falling = math.sqrt(length * math.hypot(*scene.gravity))
+    return NO_MOTION * max(falling, length / scene.duration)
 
 
 def given_velocities(bodies: Sequence[Sequence[Body]], q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from math import dist, sqrt
 from typing import NamedTuple
 
@@ -11,6 +12,7 @@ from mbref.rotations import Vector3
 from mbref.scene import JOINT_TYPES, Joint, SceneError
 from mbref.scene.joints import ANGLE, Coordinate, X, Y, Z
 
+MOST_JOINTS = 4096  # number of joints whose primitives are kept
 ORIGIN = (0.0, 0.0, 0.0)
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 ROWS_OF = {POINT: 3, DOT1: 1, DOT2: 1, DISTANCE: 1, COUPLED_ANGLE: 1, COUPLED_SLIDE: 1}
@@ -55,6 +57,19 @@ def driver_primitive(joint: Joint) -> Primitive:
     if joint.facts.driven is None:
         raise SceneError([f"joint {joint.name!r}: joints of type {joint.type!r} cannot be driven"])
     return of_coordinate(joint, joint.facts.driven, (DOT1, DOT2), driven=True)
+
+
+@lru_cache(maxsize=MOST_JOINTS)
+def rows_of_joint(joint: Joint, is_driven: bool) -> tuple[list[Primitive], list[tuple[float, ...]]]:
+    """Return the primitives of a joint and its driver, and ``vectors_of`` each of them."""
+    found = [*primitives_of(joint), *([driver_primitive(joint)] if is_driven else [])]
+    return found, [*map(vectors_of, found)]
+
+
+def vectors_of(p: Primitive) -> tuple[float, ...]:
+    """Return 16 numbers of a primitive: two points, the directions ``direction_first``, ``turning_first`` and
+    ``direction_second``, and a length or the factor of a joint coordinate."""
+    return *p.point_first, *p.point_second, *p.first, *p.turning, *p.second, p.length
 
 
 def unit(v: Sequence[float]) -> Vector3:

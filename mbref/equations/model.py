@@ -7,8 +7,8 @@ converted to the bodies' own frames.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -51,7 +51,9 @@ class Terms:
 
     def less(self, value: Any) -> Terms:
         """Return the terms of Φ - value (m,)."""
-        return replace(self, phi=self.phi - value)
+        return Terms(
+            self.structure, self.mass, self.blocks, self.phi - value, self.nu, self.gamma, self.force
+        )
 
     @functools.cached_property
     def jacobian(self) -> np.ndarray:
@@ -76,7 +78,7 @@ class Model:
         self.scene, self._packs, self._place = packs.scenes[place], packs, place
         self.bodies, self.joints = packs.listed[place], packs.joints[place]
         self.nb, self.n, self.kinematic = packs.nb, 6 * packs.nb, packs.kinematic
-        self.structure, self.data = packs.structure, row_of(packs.data, place)
+        self.structure, self.data = packs.structure, self.once(_own_data)
         self.m, self.row_joint = len(self.structure.row_joint), self.structure.row_joint
         self.entry_columns, self.sizes = self.structure.entry_columns, self.structure.sizes
         self.has_angles, self.closed_loops = self.structure.has_angles, self.structure.closed_loops
@@ -94,14 +96,16 @@ class Model:
             self.put_numbers(self._pooled.values, self.data)
         return self._pooled
 
-    def once(self, function: Callable[[Model], Found]) -> Found:
-        """Return the result of a function of this model, which is called once for a packed scene.
+    def once(self, function: Callable[..., Found], *arguments: Hashable) -> Found:
+        """Return the result of a function of this model and of further arguments, which is called once for a
+        packed scene.
 
         The result is never changed, because further runs of the scene read it.
         """
-        if function not in self._found:
-            self._found[function] = function(self)
-        found: Found = self._found[function]
+        key = function, *arguments
+        if key not in self._found:
+            self._found[key] = function(self, *arguments)
+        found: Found = self._found[key]
         return found
 
     def release(self) -> None:
@@ -193,6 +197,12 @@ class Model:
         """Return ``motion_of`` for the scene's bodies."""
         principal = self.principal if self._packs.turns_frames else None
         return motion_of(q, v, a, principal, len(self.scene.body))
+
+
+def _own_data(model: Model) -> SceneData:
+    """Return the arrays of a model's scene among the arrays of all packed scenes."""
+    data: SceneData = row_of(model._packs.data, model._place)
+    return data
 
 
 def motion_of(

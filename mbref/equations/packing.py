@@ -7,8 +7,8 @@ is the scene. An entry that scenes share is converted once.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from mbref import rotations
 from mbref.equations.couplings import coordinate_primitives, couplings_of
 from mbref.equations.functions import functions_of, numbers_of, pieces_of
-from mbref.equations.joints import Primitive, driver_primitive, primitives_of
+from mbref.equations.joints import Primitive, rows_of_joint, vectors_of
 from mbref.equations.largest_distance import largest_distances
 from mbref.equations.load_numbers import (
     Values,
@@ -27,8 +27,15 @@ from mbref.equations.load_numbers import (
     numbers_of_load,
     turning_joints,
 )
-from mbref.equations.parts import FRAME, all_parts
-from mbref.equations.structure import Places, PrimitivePlace, TurningPlace, structure_of
+from mbref.equations.parts import FRAME, all_parts, shape_of
+from mbref.equations.structure import (
+    MOST_KEPT,
+    Places,
+    PrimitivePlace,
+    Structure,
+    TurningPlace,
+    structure_of,
+)
 from mbref.equations.units import body_lengths, inverse_root, metric
 from mbref.kernels.scene_layout import (
     Bodies,
@@ -47,6 +54,8 @@ from mbref.scene import (
 from mbref.scene.fields import COINCIDENT
 
 OF_MASS = np.array([7, 7, 7, 8, 9, 10])  # indices of a body's parameters on the diagonal of M
+
+_structures: dict[Hashable, Structure] = {}  # by shape
 
 
 class Packs:
@@ -73,11 +82,9 @@ class Packs:
         self.index[FRAME] = self.nb
         joints = [joint for joints in self.joints for joint in joints]
         driven = {driver.joint: k for k, driver in enumerate(scenes[0].driver)}
-        of_joints = _once(partial(_of_joint, driven=driven), joints)
+        of_joints = _once(lambda joint: rows_of_joint(joint, joint.name in driven), joints)
         of_couplings = [[*map(coordinate_primitives, found)] for found in self._coupled]
-        self.structure = structure_of(
-            self._places([found for found, _ in of_joints], of_couplings[0], driven)
-        )
+        self.structure = self._structure([found for found, _ in of_joints], of_couplings[0], driven)
         bodies = self._bodies()
         lengths = self._lengths(joints)
         primitives, loads, turning = self._fixed_in_bodies(
@@ -109,8 +116,22 @@ class Packs:
         count = len(self.joints[0])
         for k, pairs in enumerate(of_couplings):
             found += [numbers for rows in of_joints[k * count : (k + 1) * count] for numbers in rows]
-            found += [_numbers(primitive) for pair in pairs for primitive in pair]
+            found += [vectors_of(primitive) for pair in pairs for primitive in pair]
         return found
+
+    def _structure(
+        self,
+        primitives: Sequence[Sequence[Primitive]],
+        coupled: Sequence[tuple[Primitive, ...]],
+        driven: Mapping[str, int],
+    ) -> Structure:
+        """Return the structure of the scenes, found once for each shape."""
+        shape = self.kinematic, shape_of(self.scenes[0])
+        if shape not in _structures:
+            if len(_structures) >= MOST_KEPT:
+                _structures.pop(next(iter(_structures)), None)
+            _structures[shape] = structure_of(self._places(primitives, coupled, driven))
+        return _structures[shape]
 
     def _places(
         self,
@@ -231,6 +252,8 @@ class Packs:
     def _functions(self) -> Functions:
         """Return all functions of time, with polynomials filled up with zeros to the highest degree."""
         functions = [function for scene in self.scenes for function in functions_of(scene)]
+        if not functions:
+            return _no_functions(len(self.scenes))
         terms, count = self.structure.places.terms, self.structure.places.functions
         numbers = self._rows(_once(partial(numbers_of, terms=terms), functions), 3 + terms)
         found = _once(pieces_of, functions)
@@ -256,19 +279,25 @@ class Packs:
         return poses.reshape(len(self.scenes), 7 * self.nb)
 
 
+@lru_cache(maxsize=8)
+def _no_functions(scenes: int) -> Functions:
+    """Return the functions of time of scenes without any."""
+    numbers, first = np.zeros((scenes, 0)), np.zeros((scenes, 1), dtype=np.int64)
+    return Functions(first, numbers, numbers, numbers, np.zeros((scenes, 0, 1)), numbers, numbers,
+                     np.zeros((scenes, 0, 4)))  # fmt: skip
+
+
 def row_of(values: Any, place: Any) -> Any:
     """Return the arrays of one scene, or of several, from a schema with the arrays of all scenes."""
-    return type(values)(*(row_of(v, place) if isinstance(v, tuple) else v[place] for v in values))
+    return values._make([row_of(v, place) if isinstance(v, tuple) else v[place] for v in values])
 
 
 def _once(function: Callable[[Any], Any], entries: Sequence[Any]) -> list[Any]:
     """Return a function's values for all entries; the function is called once for an entry that occurs
     several times."""
-    known: dict[int, Any] = {}
-    for entry in entries:
-        if id(entry) not in known:
-            known[id(entry)] = function(entry)
-    return [known[id(entry)] for entry in entries]
+    places = [*map(id, entries)]
+    known = {place: function(entry) for place, entry in dict(zip(places, entries, strict=True)).items()}
+    return [*map(known.__getitem__, places)]
 
 
 def _quaternions(axes: Sequence[np.ndarray | None]) -> np.ndarray:
@@ -298,15 +327,3 @@ def _principal_axes(inertia: Any) -> tuple[Sequence[float], np.ndarray | None]:
     moments, axes = np.linalg.eigh(np.array(inertia))
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
     return np.maximum(moments, 0.0), axes
-
-
-def _of_joint(joint: Joint, driven: Mapping[str, int]) -> tuple[list[Primitive], list[Values]]:
-    """Return the primitives of a joint and its driver, and 16 numbers of each: two points, three directions
-    and a length. The directions are ``direction_first``, ``turning_first`` and ``direction_second``."""
-    found = [*primitives_of(joint), *([driver_primitive(joint)] if joint.name in driven else [])]
-    return found, [_numbers(p) for p in found]
-
-
-def _numbers(p: Primitive) -> Values:
-    """Return two points, three directions and a length, or the factor of a joint coordinate."""
-    return *p.point_first, *p.point_second, *p.first, *p.turning, *p.second, p.length

@@ -178,6 +178,11 @@ class Reduction:
         return data._replace(primitives=kept)
 
 
+def reduced_data(model: Model, reduction: Reduction) -> SceneData:
+    """Return the data of a model's scene without the primitives that have no nonzero entry."""
+    return reduction.scene(model.data)
+
+
 _known: dict[Structure, list[Reduction]] = {}
 
 

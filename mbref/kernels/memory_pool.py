@@ -120,9 +120,8 @@ def fill(target: tuple[Any, ...], arrays: Sequence[np.ndarray]) -> None:
 
 
 def write_record(record: Any, values: Any) -> None:
-    """Write numbers to a record."""
-    for name, value in zip(values._fields, values, strict=True):
-        record[name] = value
+    """Write the numbers of a schema to a record of the schema."""
+    record.base[0] = values
 
 
 def copied(values: Any) -> Any:

@@ -83,10 +83,13 @@ def meant(word: str, known: Iterable[str]) -> str:
 
 
 def checked_size(value: float) -> float:
-    """Return the number; raises ValueError if it is so large that its powers would overflow."""
+    """Return the number, 0 for -0: equal scenes have equal bits.
+
+    Raises ValueError if the number is so large that its powers would overflow.
+    """
     if abs(value) > LARGEST:
         raise ValueError(f"must be at most {LARGEST:g} in size, got {value:g}")
-    return value
+    return value + 0.0
 
 
 def checked_length(value: float) -> float:
@@ -98,7 +101,7 @@ def checked_length(value: float) -> float:
 
 def checked_mass(value: float) -> float:
     """Return the number, zero or positive; raises ValueError if its powers would overflow or vanish."""
-    return value if value == 0 else checked_length(value)
+    return 0.0 if value == 0 else checked_length(value)
 
 
 def as_list(value: Any) -> Any:

@@ -108,7 +108,7 @@ class JointEntry(SceneEntry):
     @property
     def reflected_inertia(self) -> float:
         """The ``armature`` of the driven coordinate, kg m² or kg; 0 for joints without this field."""
-        return getattr(self, "armature", 0.0)
+        return 0.0
 
 
 class _AnchorJoint(JointEntry):
@@ -131,6 +131,10 @@ class _AxisJoint(_AnchorJoint):
 
 class _TurningJoint(_AxisJoint):
     armature: RotorInertia = 0.0  # kg m², of the driven angle q: the kinetic energy ½ armature q'²
+
+    @property
+    def reflected_inertia(self) -> float:
+        return self.armature
 
 
 class Fixed(_AnchorJoint):

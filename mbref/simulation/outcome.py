@@ -208,8 +208,8 @@ def _message(run: Run, status: int) -> str:
 def _of_bushings(run: Run) -> str:
     """Return the reason why the default method is not `taylor`; empty if it is, or for another method."""
     found = bushings(run.scene)
-    is_default = str(run.method) == str(Method.parse(default_method(run.scene)))
-    return BUSHING.format(found[0]) if found and is_default else ""
+    is_default = found and str(run.method) == str(Method.parse(default_method(run.scene)))
+    return BUSHING.format(found[0]) if is_default else ""
 
 
 def _left_from_rest(run: Run) -> str:

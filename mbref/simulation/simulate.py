@@ -36,6 +36,7 @@ __all__ = ["Limits", "are_compiled", "checked_times", "prepare", "simulate", "wh
 
 ProgressCall = Callable[[float], None] | None  # receives the reached time (s)
 SAMPLES = 101  # default number of samples
+BY_DEFAULT = Limits()
 
 
 def simulate(
@@ -88,7 +89,7 @@ def simulate(
         if times is not None:
             raise InputError("give sample times or a duration, not both")
         scene = scene.with_(duration=duration)
-    limits = limits or Limits()
+    limits = limits or BY_DEFAULT
     if rtol is not None:
         limits = replace(limits, rtol=rtol)
     times = checked_times(np.linspace(0.0, scene.duration, SAMPLES) if times is None else times)

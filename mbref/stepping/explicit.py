@@ -44,5 +44,7 @@ class ExplicitStepper:
         run, memory = self.run, self.run.memory
         settings = memory.equations.system.settings
         if run.method.stabilisation.projects and settings.nearly_dependent and memory.loop.clock.time > 0.0:
-            ranks = ranks_at(run.model, memory.state.coordinates, memory.factor, run.limits.rank_tolerance)
+            ranks = ranks_at(
+                run.model, memory.state.coordinates, memory.factor.symbolic, run.limits.rank_tolerance
+            )
             settings.nearly_dependent = ranks.rank != run.ranks.rank or ranks.least < NEARLY

@@ -83,7 +83,7 @@ def freedoms_of_first_order(run: Run) -> int:
 def begins_at_rest(run: Run) -> bool:
     """Return whether a run starts at rest, with closed loops without drivers, and Φ_q allows two velocities
     or more."""
-    if run.scene.driver or np.any(run.start.v) or not run.model.closed_loops:
+    if run.scene.driver or run.start.v.any() or not run.model.closed_loops:
         return False
     return freedoms_of_first_order(run) > 1
 
@@ -94,7 +94,7 @@ def begins_in_motion(run: Run) -> bool:
 
     Time counts as one velocity if drivers prescribe the motion.
     """
-    if run.memory.equations.system.settings.independent or not np.any(run.start.v):
+    if run.memory.equations.system.settings.independent or not run.start.v.any():
         return False
     return freedoms_of_first_order(run) > (0 if run.scene.driver else 1) and run.model.closed_loops > 0
 
@@ -106,7 +106,7 @@ def begins_near_singular(run: Run) -> bool:
     The velocities must satisfy Φ_q v = ν to rounding; velocities near a gap, which belong to no branch, do
     not.
     """
-    if not run.ranks.least < NEAR_SINGULAR or not np.any(run.start.v):
+    if not run.ranks.least < NEAR_SINGULAR or not run.start.v.any():
         return False
     return rate_violation(run.model, run.start.q, run.start.v) <= MET
 

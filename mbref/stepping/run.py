@@ -13,7 +13,7 @@ from mbref.equations.driver_conflicts import refuse_conflict
 from mbref.equations.initial_state import Start, consistent_start
 from mbref.equations.model import Model
 from mbref.equations.offsets import assembled
-from mbref.equations.reduction import Reduction, reduced_start
+from mbref.equations.reduction import Reduction, reduced_data, reduced_start
 from mbref.kernels.layout import (
     Active,
     Kernels,
@@ -36,7 +36,7 @@ from mbref.stabilisation.base import Stabilisation
 from mbref.stepping.control import control_of
 from mbref.stepping.limits import Limits
 from mbref.stepping.preparation import prepare
-from mbref.stepping.ranks import NO_RANKS, are_clear, ranks_at
+from mbref.stepping.ranks import NO_RANKS, are_clear, ranks_of_start
 
 NEARLY = 1e-5  # smallest singular value below which rows are nearly dependent
 
@@ -124,13 +124,15 @@ class Run:
         self._put_numbers(self.memory)
         self.put_start()
 
-    def reduced(self, data: SceneData, axis: int = 0) -> SceneData:
-        """Return the data of a scene with the primitives that samples need; ``axis`` counts primitives."""
-        return self._reduced_by(self.reduction, data, axis)
-
-    def _reduced_by(self, reduction: Reduction | None, data: SceneData, axis: int = 0) -> SceneData:
+    def reduced(self, data: SceneData) -> SceneData:
+        """Return the data (s, …) of s scenes with the primitives that samples need."""
         is_sparse = self.method.formulation.is_sparse
-        return reduction.scene(data, axis) if reduction and is_sparse else data
+        return self.reduction.scene(data, axis=1) if self.reduction and is_sparse else data
+
+    def _reduced_by(self, reduction: Reduction | None) -> SceneData:
+        """Return the data of the scene with the primitives that a part of the run needs."""
+        is_sparse = self.method.formulation.is_sparse
+        return self.model.once(reduced_data, reduction) if reduction and is_sparse else self.model.data
 
     def _acquire_memory(self) -> Pooled:
         """Return memory with the numbers of this run."""
@@ -141,10 +143,9 @@ class Run:
 
     def _put_numbers(self, memory: Memory) -> None:
         """Write the numbers of the scene, the method and the limits into memory."""
-        data = self.model.data
-        self.model.put_numbers(memory.equations, self._reduced_by(self.steps, data))
+        self.model.put_numbers(memory.equations, self._reduced_by(self.steps))
         if memory.sampled:
-            self.model.put_numbers(memory.sampled.values, self.reduced(data))
+            self.model.put_numbers(memory.sampled.values, self._reduced_by(self.reduction))
         write_record(memory.equations.system.settings, self.method.settings(self.limits.rank_tolerance))
         write_record(memory.control, self._control)
         memory.loop.times[:] = self.times
@@ -159,9 +160,10 @@ class Run:
 
     def _allocate(self) -> Memory:
         """Return memory of the method for the scene, without numbers."""
-        model, method, data = self.model, self.method, self.model.data
+        model, method = self.model, self.method
         formulation, stabilisation, integrator = method.parts
         factor, active = self._factor()
+        of_samples = self._reduced_by(self.reduction)
         is_part = self.steps is not self.reduction
         pivots = factor.symbolic.row.size
         dense_rows = model.m if formulation.scratch else 0
@@ -172,7 +174,7 @@ class Run:
         sizes["watched_numbers"] = factor.l.size if watched else 0
         equations = model.equations(
             sizes,
-            self._reduced_by(self.steps, data),
+            self._reduced_by(self.steps),
             options=method.packed_options(formulation),
             scratch=packed(allocate(formulation.scratch, sizes) if formulation.scratch else factor),
         )
@@ -190,7 +192,7 @@ class Run:
             chart=packed(allocate(stabilisation.memory, sizes)) if stabilisation.memory else None,
             chart_options=method.packed_options(stabilisation),
             integrator=packed(allocate(integrator.schema, sizes)),
-            sampled=packed(equations._replace(scene=copied(self.reduced(data)))) if is_part else None,
+            sampled=packed(equations._replace(scene=copied(of_samples))) if is_part else None,
             balance=packed(self.reduction.factor()) if self.reduction and is_part else None,
         )
 
@@ -228,7 +230,7 @@ class Run:
         memory.state.coordinates[:] = self.start.q
         memory.state.velocities[:] = self.start.v
         self.ranks, settings = NO_RANKS, memory.equations.system.settings
-        ranks = ranks_at(self.model, self.start.q, memory.factor, self.limits.rank_tolerance, self._blocks)
+        ranks = self.model.once(ranks_of_start, self.steps, self.limits.rank_tolerance)
         settings.independent = ranks.rank == memory.pivots.size - self.links
         if self.method.stabilisation.projects:
             self.ranks = ranks

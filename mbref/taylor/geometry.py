@@ -11,13 +11,22 @@ import numpy as np
 
 from mbref.equations.initial_state import Start
 from mbref.equations.model import Model
+from mbref.equations.reduction import reduced_start
 from mbref.taylor.natural import NaturalCoordinates, pose_of
 from mbref.taylor.numbers import OneScene
+from mbref.taylor.polynomial_layout import Polynomials
 from mbref.taylor.polynomials import Geometry
 
 MOST_GEOMETRIES = 64  # largest number of cached geometries
 
 _known: dict[Hashable, Geometry] = {}
+
+
+def equations_of(model: Model, moving: bytes, driven: bool) -> tuple[Geometry, Polynomials]:
+    """Return ``geometry_of`` a scene at its start, with ``moving`` as bytes, and the scene's polynomials."""
+    start, *_ = reduced_start(model)
+    found = geometry_of(model, start, np.frombuffer(moving, dtype=bool), driven)
+    return found, found.polynomials(model)
 
 
 def geometry_of(model: Model, start: Start, moving: np.ndarray, driven: bool) -> Geometry:

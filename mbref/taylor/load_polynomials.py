@@ -22,11 +22,16 @@ def constant_forces(data: SceneData, forms: Forms) -> tuple[np.ndarray, np.ndarr
     by_weight = weight[..., None] * forms.centres
     force = by_weight.reshape(*by_weight.shape[:-3], 3 * of.nb, d).sum(axis=-2)
     linear = np.zeros((*force.shape, d))
-    for k, kind in enumerate(loads.kind.tolist()):
-        if kind in (FORCE, MOMENT) and loads.function[k] < 0:
-            constant, matrix = _force_of(k, loads, forms)
-            force, linear = force + constant, linear + matrix
+    for k in np.flatnonzero(is_constant(loads)).tolist():
+        constant, matrix = _force_of(k, loads, forms)
+        force, linear = force + constant, linear + matrix
     return force, linear
+
+
+def is_constant(loads: Loads) -> np.ndarray:
+    """Return which loads (l,) are forces or moments that do not change over time."""
+    of_bodies: np.ndarray = (loads.kind == FORCE) | (loads.kind == MOMENT)
+    return of_bodies & (loads.function < 0)
 
 
 def _force_of(k: int, loads: Loads, forms: Forms) -> tuple[np.ndarray, np.ndarray]:
@@ -45,14 +50,12 @@ def _moment(forms: Forms, body: int, moment: np.ndarray) -> tuple[np.ndarray, np
     """Return constant (…, d) and linear (…, d, d) force of a moment (…, 3): ½ Σ (moment × R e) · δ(R e) over
     three axes."""
     at_rest, moving = map(forms.spread, forms.of_axes(body))
-    constant, matrix = np.zeros(()), np.zeros(())
-    for k in range(0, 9, 3):
-        form = moving[..., k : k + 3, :]
-        turned = rotations.cross(moment, at_rest[..., k : k + 3])
-        turning = rotations.cross(moment[..., None, :], form.swapaxes(-1, -2)).swapaxes(-1, -2)
-        constant = constant + 0.5 * sum_of_products(turned[..., None], form)[..., 0, :]
-        matrix = matrix + 0.5 * sum_of_products(form, turning)
-    return constant, matrix
+    axes = moving.reshape(*moving.shape[:-2], 3, 3, forms.d)
+    turned = rotations.cross(moment[..., None, :], at_rest.reshape(*at_rest.shape[:-1], 3, 3))
+    turning = rotations.cross(moment[..., None, None, :], axes.swapaxes(-1, -2)).swapaxes(-1, -2)
+    constant = 0.5 * sum_of_products(turned[..., None], axes)[..., 0, :]
+    matrix = 0.5 * sum_of_products(axes, turning)
+    return constant.sum(axis=-2), matrix.sum(axis=-3)
 
 
 def springs_of(loads: Loads, forms: Forms) -> Springs:

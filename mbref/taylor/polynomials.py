@@ -15,6 +15,7 @@ from mbref.taylor.forms import Forms
 from mbref.taylor.load_polynomials import (
     constant_forces,
     coupled_angles,
+    is_constant,
     slides_of,
     springs_of,
     timed_forces,
@@ -43,7 +44,7 @@ class Geometry:
         self._poses, self._given = _poses(of, self._forms), _given(of)
         self.tableau = _tableau(self._rows, len(of.kept), len(of.rows), self._lanes)
         self._angles = coupled_angles(self._forms)
-        self._no_loads: dict[str, Any] | None = None  # tables of loads of scenes without loads
+        self._no_loads: dict[str, Any] | None = None  # tables of scenes whose loads are all constant
 
     def polynomials(self, model: Model) -> Polynomials:
         """Return the polynomials of a scene of this geometry."""
@@ -57,9 +58,10 @@ class Geometry:
         )
 
     def _loads(self, data: SceneData) -> dict[str, Any]:
-        """Return the tables of loads that are not constant; tables without loads are made once."""
+        """Return the tables of loads that are not constant; tables without such loads are made once."""
         loads = data.loads
-        if not loads.kind.size and self._no_loads:
+        are_constant = bool((is_constant(loads)).all())
+        if are_constant and self._no_loads:
             return self._no_loads
         found = {
             "springs": springs_of(loads, self._forms),
@@ -67,7 +69,7 @@ class Geometry:
             "slides": slides_of(loads, self._forms),
             "timed": timed_forces(loads, self._forms),
         }
-        self._no_loads = self._no_loads if loads.kind.size else found
+        self._no_loads = found if are_constant else self._no_loads
         return found
 
 

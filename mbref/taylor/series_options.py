@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
 from mbref.input_error import InputError
 from mbref.stepping.limits import GENERATED, GENERIC
@@ -51,7 +51,7 @@ def order_of(tolerance: float, wanted: float, code: str) -> int:
     outside 4 to 30."""
     if wanted == 0:
         first, per_digit = CHEAPEST[code]
-        best = 2 * round((first - per_digit * np.log10(tolerance)) / 2)
+        best = 2 * round((first - per_digit * math.log10(tolerance)) / 2)
         return int(min(max(best, LEAST_ORDER), MOST_ORDER))
     if wanted not in range(LEAST_ORDER, MOST_ORDER + 1):
         raise InputError(f"taylor: order must be {LEAST_ORDER} to {MOST_ORDER}, got {wanted:g}")

@@ -22,7 +22,7 @@ from mbref.taylor.batch_equations import equations_of_all
 from mbref.taylor.crossing.branches import BranchFollower
 from mbref.taylor.crossing.thresholds import START_ERROR
 from mbref.taylor.driven import follow_drivers
-from mbref.taylor.geometry import geometry_of
+from mbref.taylor.geometry import equations_of
 from mbref.taylor.mode import REGULAR
 from mbref.taylor.sample_completion import complete_samples
 from mbref.taylor.series_memory import acquire_memory, put_equations
@@ -43,8 +43,8 @@ class SeriesStepper:
         self._options = series_options(run)
         self._take = follow_drivers if self._options.follows_drivers else advance_series
         self._take.prepare()  # before the clock of the run
-        self.geometry = geometry_of(run.model, run.start, self._moving, bool(self._options.follows_drivers))
-        self.polynomials = self.geometry.polynomials(run.model)
+        parts = self._moving.tobytes(), bool(self._options.follows_drivers)
+        self.geometry, self.polynomials = run.model.once(equations_of, *parts)
         self._pooled = acquire_memory(run, self.geometry, self.polynomials, self._options.accurate_order)
         self.taylor, self.argument = self._pooled.values, self._pooled.packed.argument
         self._calls, self._sampling = 0, 0.0  # calls that advance the run; s of CPU time for samples
