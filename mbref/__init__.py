@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from mbref.design.equilibrium import Equilibrium, equilibria, motion_of_mode
     from mbref.ensembles.ensemble import ensemble
     from mbref.equations.counts import counts
+    from mbref.equations.matrices import Matrices
     from mbref.equations.offsets import angles_at_start, assembled
     from mbref.input_error import InputError
     from mbref.method import Method, MethodError
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from mbref.scenes import SCENES, find_scene
     from mbref.simulation.second_run import with_error_estimate
     from mbref.simulation.simulate import Limits, simulate
+    from mbref.simulation.terms import terms
 
 __version__ = "0.2.0"
 
@@ -34,6 +36,7 @@ _PUBLIC = {  # module → its public names
     "design.equilibrium": ("Equilibrium", "equilibria", "motion_of_mode"),
     "ensembles.ensemble": ("ensemble",),
     "equations.counts": ("counts",),
+    "equations.matrices": ("Matrices",),
     "equations.offsets": ("angles_at_start", "assembled"),
     "input_error": ("InputError",),
     "method": ("Method", "MethodError"),
@@ -47,6 +50,7 @@ _PUBLIC = {  # module → its public names
     "scenes": ("SCENES", "find_scene"),
     "simulation.second_run": ("with_error_estimate",),
     "simulation.simulate": ("Limits", "simulate"),
+    "simulation.terms": ("terms",),
 }
 _MODULE_OF = {name: f"mbref.{module}" for module, names in _PUBLIC.items() for name in names}
 
@@ -58,6 +62,7 @@ __all__ = [
     "ErrorEstimate",
     "InputError",
     "Limits",
+    "Matrices",
     "Method",
     "MethodError",
     "Motion",
@@ -77,6 +82,7 @@ __all__ = [
     "plot",
     "simulate",
     "still",
+    "terms",
     "variants",
     "with_error_estimate",
 ]

@@ -32,6 +32,7 @@ MOST_NAMES = 256  # names whose parsed methods are cached
 MOST_ORIENTATIONS = 400  # of runs by `taylor` in place of a sparse run: a step takes a second
 # default methods for few and for many bodies
 SERIES_METHOD, SPARSE_METHOD = TAYLOR.name, "alf-dual+projection/dop853"
+OWN = "own:"  # begins the method's name of a run by a user's own formulation
 OLD_SERIES_NAME = "alf-dual+projection/taylor"  # in records of versions up to 0.2
 # Largest number of bodies of runs by `taylor` that check or repeat another run
 MOST_BODIES = 100

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from mbref.input_error import InputError
-from mbref.method import MOST_BODIES, SERIES_METHOD, Method, MethodError, crossing_method
+from mbref.method import MOST_BODIES, OWN, SERIES_METHOD, Method, MethodError, crossing_method
 from mbref.motions.error_estimate import ErrorEstimate, distances, rounding
 from mbref.motions.motion import Motion
 from mbref.scene import Scene, SceneError
@@ -27,6 +27,7 @@ from mbref.stepping.limits import AUTO, FINEST, GENERATED, Limits
 ORDER = 24
 # relative tolerances of the second run, the larger one also of a further run of a motion with a warning
 RTOL_SERIES, RTOL_EXPLICIT = 1e-13, 1e-12
+OWN_LIKE = "lm1"  # built-in method with adaptive steps and without projection, as an own formulation
 TIGHTER = 0.1  # factor on the motion's own tolerance, if that gives a smaller tolerance
 UNIT = 2.0**-52  # largest relative distance between neighbouring doubles
 LONGER = "; --estimate yes and with_error_estimate have no time limit"
@@ -71,7 +72,8 @@ def _estimate(motion: Motion, seconds: float, progress: ProgressCallback | None)
     """Return the estimated error of a motion."""
     if motion.engine != "mbref":
         raise InputError(f"error_estimate: a motion of {motion.engine}; crosscheck judges other engines")
-    method = Method.parse(motion.method)
+    is_own = motion.method.startswith(OWN)
+    method = Method.parse(OWN_LIKE if is_own else motion.method)
     limits = Limits(**{f.name: motion.settings[f.name] for f in fields(Limits)})
     rtol = limits.rtol if method.integrator.adaptive else None
     if reason := _none(motion, seconds):
@@ -82,7 +84,7 @@ def _estimate(motion: Motion, seconds: float, progress: ProgressCallback | None)
     error = np.maximum(second.distances(motion), rounding(motion, second.length))
     reason = second.reason if second.is_short(motion) else ""
     estimate = ErrorEstimate(motion.times, error, rtol, f"{by}, rtol {finer.rtol:g}", reason)
-    if not estimate.warning or limits.rtol <= RTOL_EXPLICIT:
+    if is_own or not estimate.warning or limits.rtol <= RTOL_EXPLICIT:
         return estimate
     tighter = replace(limits, rtol=RTOL_EXPLICIT, atol=None, compared=False)
     tried = _run(lambda: motion.mechanism, method, motion.times, tighter, check)

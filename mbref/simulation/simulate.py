@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from mbref.equations.matrices import Matrices
 from mbref.input_error import InputError
 from mbref.kernels.background import compiled_in_background
 from mbref.kernels.compilation import Exchangeable
@@ -48,6 +50,8 @@ def simulate(
     *,
     duration: float | None = None,
     rtol: float | None = None,
+    formulation: Callable[[Matrices], Any] | None = None,
+    stabilisation: Callable[[Matrices], tuple[Any, Any]] | str = "none",
 ) -> Motion:
     """Simulate a scene from t = 0.
 
@@ -68,6 +72,11 @@ def simulate(
         End time, s, of the default sample times. Default: the scene's duration.
     rtol : float, optional
         Relative tolerance; replaces the tolerance of ``limits``.
+    formulation : callable, optional
+        A formulation of your own in place of a method: receives ``Matrices`` and returns q̈ (n,), or q̈ and λ
+        (m,). SciPy's DOP853 takes the steps, and each evaluation calls Python: such a run is far slower.
+    stabilisation : {"none", "projection"} or callable
+        Correction after each step of such a run. A function receives ``Matrices`` and returns q and v.
 
     Returns
     -------
@@ -79,7 +88,8 @@ def simulate(
     SceneError
         If the scene cannot be simulated.
     InputError
-        If times do not increase or are given beside a duration, or the integrator does not have the order.
+        If times do not increase or are given beside a duration, the integrator does not have the order, or
+        a function returns arrays of other shapes.
     MethodError
         If the method is unknown, has no generated code, or crosses no singular position at which ``limits``
         request a branch.
@@ -93,6 +103,14 @@ def simulate(
     if rtol is not None:
         limits = replace(limits, rtol=rtol)
     times = checked_times(np.linspace(0.0, scene.duration, SAMPLES) if times is None else times)
+    if formulation is not None:
+        if method is not None:
+            raise InputError("give a method or a formulation of your own, not both")
+        from mbref.simulation.own_formulation import simulate_own  # only such runs need it
+
+        return simulate_own(scene, formulation, stabilisation, times, limits, progress)
+    if stabilisation != "none":
+        raise InputError("stabilisation: needs a formulation of your own; otherwise name it in the method")
     if method is None:
         return _by_default(scene, times, limits, progress)
     return _by(Method.parse(method) if isinstance(method, str) else method, scene, times, limits, progress)

@@ -1,4 +1,4 @@
-"""Strategies of the property tests: directions, poses, joints between two bodies, and states."""
+"""Strategies of the property tests: directions, poses, and joints between two bodies."""
 
 import numpy as np
 from hypothesis import strategies as st
@@ -60,11 +60,3 @@ def one_joint_scenes(draw, kind: type, driven: bool) -> Scene:
         joint=(joint,),
         driver=(driver,) if driven else (),
     )
-
-
-@st.composite
-def states(draw, nb: int) -> tuple[float, np.ndarray, np.ndarray]:
-    """A time, coordinates (7 nb,) and velocities (6 nb,), not consistent with anything."""
-    q = [value for _ in range(nb) for value in (*draw(vectors), *draw(quaternions))]
-    v = [value for _ in range(nb) for value in (*draw(vectors), *draw(vectors))]
-    return draw(st.floats(0, 2)), np.array(q), np.array(v)
