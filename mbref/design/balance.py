@@ -25,7 +25,7 @@ BALANCED = 1e-11
 BALANCE_ROUNDING = 1e-15  # the same for accelerations that are rounding alone
 PLACED = 64.0 * EPSILON  # rounding of a pose / length: stiff springs accelerate by it
 LEAST_GAIN = 0.01  # least relative decrease of the displacement by a whole step, which may be a limited one
-BETTER = 0.9  # largest ratio of displacements of successive refinements
+REFINED = 0.9  # largest ratio of displacements of successive refinements
 UNDECIDED = 1e-4  # largest distance that is tried of an equilibrium without stiffness / length, or rad
 ONE_POSE = 1e-6  # distance / length, or rad, below which two poses are one
 LINKS = 40  # largest number of steps between two poses of one family
@@ -97,7 +97,7 @@ class Newton:
             parts = self.parts(moved.off_balance())
             moves = -np.where(is_stiff, parts, 0.0) / np.where(is_stiff, self.stiffness, 1.0)
             size = float(np.linalg.norm(moves * self.sizes))
-            if not PLACED < size < BETTER * before:
+            if not PLACED < size < REFINED * before:
                 return moved
             back = moved.moved(moved.coordinates(self.tangent.basis @ (self.directions @ moves)))
             if back is None or back.freedoms != moved.freedoms:
@@ -168,7 +168,7 @@ def _refined(here: Newton, freedoms: int) -> Newton:
         moved = here.tangent.moved(here.step())
         if moved is None or moved.freedoms != freedoms:
             return here
-        if not here.level(moved.off_balance()) < BETTER * here.level(here.off):
+        if not here.level(moved.off_balance()) < REFINED * here.level(here.off):
             return here
         try:
             here = Newton(moved)
