@@ -11,7 +11,7 @@ import numpy as np
 from crosscheck.engine import engine_names
 from crosscheck.judge.model_identity import gate_times
 from crosscheck.study.grid import Record
-from crosscheck.study.record_shape import Run, Timing, Truth, Verdicts, checked
+from crosscheck.study.record_shape import Picture, Run, Timing, Truth, Verdicts, checked
 from crosscheck.study.record_view import of_scenes, with_time
 from crosscheck.study.store import read, unpacked
 from mbref.records import json_content
@@ -20,11 +20,11 @@ from mbref.scene import Scene
 from .runs import SceneRuns, by_scene
 
 # shape of the records of each file
-SHAPES: dict[str, type[Run] | type[Truth]] = {
+SHAPES: dict[str, type[Picture] | type[Truth]] = {
     "records": Run,
     "truths": Truth,
-    "motions": Run,
-    "branches": Run,
+    "motions": Picture,
+    "branches": Picture,
 }
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, model_validator
 
 from mbref.motions.trajectory import Outcome
 from mbref.records import RecordsError
@@ -20,7 +22,34 @@ def _label(text: str) -> str:
     return text
 
 
+def _rows_of(width: int) -> Callable[[list[Any]], list[Any]]:
+    """Return the function that returns rows of ``width`` numbers, and raises ValueError for others."""
+
+    def checked_rows(rows: list[Any]) -> list[Any]:
+        if any(not isinstance(row, list) or len(row) != width for row in rows):
+            raise ValueError(f"must have rows of {width} numbers")
+        _numbers(list(chain.from_iterable(rows)))
+        return rows
+
+    return checked_rows
+
+
+def _numbers(values: list[Any]) -> list[Any]:
+    """Return the values if each is null or a number of double precision; raises ValueError for others."""
+    if not {type(value) for value in values} <= {int, float, type(None)}:
+        raise ValueError("must be numbers")
+    try:
+        np.array(values, dtype=float)
+    except OverflowError:
+        raise ValueError("has a number that is too large") from None
+    return values
+
+
 Label = Annotated[str, AfterValidator(_label)]
+Numbers = Annotated[list[Any], AfterValidator(_numbers)]
+Vectors = Annotated[list[Any], AfterValidator(_rows_of(3))]
+Quaternions = Annotated[list[Any], AfterValidator(_rows_of(4))]
+Wrenches = Annotated[list[Any], AfterValidator(_rows_of(6))]
 
 
 class _Shape(BaseModel):
@@ -42,6 +71,25 @@ class Cost(_Shape):
 
     seconds: float
     steps: int = 0
+
+
+class _Crossing(_Shape):
+    time: float
+    taken: int
+    sentence: str
+
+
+class _Estimate(_Shape):
+    largest: float | None
+
+
+class _Body(_Shape):
+    position: Vectors
+    orientation: Quaternions
+    velocity: Vectors | None = None
+    angular_velocity: Vectors | None = None
+    acceleration: Vectors | None = None
+    angular_acceleration: Vectors | None = None
 
 
 class Ladder(_Shape):
@@ -83,8 +131,8 @@ class Measured(Refused):
     cost: Cost
 
 
-class Run(Ladder):
-    """Record of a run (`study.grid.record_of`); its motion may be left out."""
+class Picture(Ladder):
+    """Record of a run for a picture: its motion may have no velocities, or may be left out."""
 
     settings: dict[str, Any]
     cost: Cost
@@ -92,16 +140,50 @@ class Run(Ladder):
     times: list[float]
     seed: int = 0
     mechanism: str | None = None
-    bodies: dict[str, dict[str, list[Any] | None]] | None = None
-    reactions: dict[str, list[Any]] | None = None
+    bodies: dict[str, _Body] | None = None
+    reactions: dict[str, Wrenches] | None = None
     open_reactions: dict[str, list[int]] | None = None
-    crossings: list[dict[str, Any]] | None = None
-    error_estimate: dict[str, Any] | None = None
+    angles: dict[str, Numbers] | None = None
+    crossings: list[_Crossing] | None = None
+    error_estimate: _Estimate | None = None
+
+    @model_validator(mode="after")
+    def _has_a_row_for_each_time(self) -> Picture:
+        parts = [self.reactions, self.open_reactions, self.angles]
+        tables = {name: rows for part in parts for name, rows in (part or {}).items()}
+        _compare(self.times, self.bodies or {}, tables)
+        return self
+
+
+class Run(Picture):
+    """Record of a run (`study.grid.record_of`); its motion may be left out."""
+
+    @model_validator(mode="after")
+    def _has_velocities(self) -> Run:
+        for name, body in (self.bodies or {}).items():
+            if body.velocity is None or body.angular_velocity is None:
+                raise ValueError(f"{name} has no velocities")
+        return self
+
+
+def _compare(times: list[float], bodies: dict[str, _Body], tables: dict[str, list[Any]]) -> None:
+    """Raise ValueError unless states of bodies and tables have a row for each time."""
+    states = {
+        f"{name}.{key}": rows for name, body in bodies.items() for key, rows in body if rows is not None
+    }
+    for name, rows in (states | tables).items():
+        if len(rows) != len(times):
+            raise ValueError(f"{name} has {len(rows)} rows for {len(times)} times")
 
 
 class _Motion(_Shape):
     times: list[float]
-    bodies: dict[str, dict[str, list[list[float]]]]
+    bodies: dict[str, _Body]
+
+    @model_validator(mode="after")
+    def _has_a_row_for_each_time(self) -> _Motion:
+        _compare(self.times, self.bodies, {})
+        return self
 
 
 class Truth(_Shape):
@@ -160,11 +242,12 @@ def checked(
         try:
             shape.model_validate(record)
         except ValidationError as error:
-            fault = error.errors(include_url=False, include_input=False)[0]
+            fault = error.errors(include_url=False, include_input=False, include_context=False)[0]
+            message = fault["msg"].removeprefix("Value error, ")
             field = ".".join(map(str, fault["loc"])) or "the record"
             name = record.get("key") or record.get("engine") if isinstance(record, dict) else None
             raise RecordsError(
-                f"{path}: record {str(name)[:12]!r}: {field}: {fault['msg'][:1].lower()}{fault['msg'][1:]}; "
+                f"{path}: record {str(name)[:12]!r}: {field}: {message[:1].lower()}{message[1:]}; "
                 "remove this line, or the file"
             ) from None
     return records

@@ -12,16 +12,23 @@ import numpy as np
 
 from mbref.equations.gaps import lengths_of_rows
 from mbref.equations.model import Model, Terms, displaced
-from mbref.equations.units import unit_rows
+from mbref.equations.units import unit_equations, unit_rows
 from mbref.linear_algebra.least_norm import least_norm
 from mbref.scene import Scene, SceneError
 
-COMPARED_TIMES = 101  # number of times over the motion at which drivers are compared
+COMPARED_TIMES = 101  # least number of times over the motion at which drivers are compared
+MOST_TIMES = 1000  # largest number; of a longer motion its begin is compared
+EVEN_TIMES = 10_001  # number of times between which the way of drivers is measured
+GOLDEN = (5**0.5 - 1) / 2  # its multiples are nowhere even
+PACE = 0.4  # largest motion of a driver between compared times, lengths or rad: Newton's method follows it
 # singular value of unit rows / largest one, below which a combination of rows vanishes
 DEPENDENT_DRIVER = 1e-9
 DRIVER_WEIGHT = 1e-6  # weight of a driver's row in such a combination above which the driver takes part
 # difference of the motions of drivers, lengths of the mechanism or rad, that is no rounding
 CONFLICT = 1e-9
+ROUNDED = 1e-15  # the same, over the largest value of a driver
+RATE_CONFLICT = 5e-11  # difference of rates over the largest rate of a driver that is no rounding
+RATE_SHARE = 2e-10  # the same over 1/duration: tables of 13 digits differ by less
 MOST_DRIVER_ROWS = 300  # constraint rows; of larger mechanisms singular values take too long
 POSE_STEPS = 20  # largest number of Newton steps to a pose
 LAST_MOVE = 1e-15  # change of a pose by the last Newton step, lengths of the mechanism or rad
@@ -29,20 +36,21 @@ LAST_MOVE = 1e-15  # change of a pose by the last Newton step, lengths of the me
 
 class Conflict(NamedTuple):
     """Drivers, by their joints, whose motions differ by ``gap`` (lengths of the mechanism or rad) at a time
-    (s)."""
+    (s), or whose rates differ by ``gap`` (over s)."""
 
     joints: tuple[str, ...]
     time: float
     gap: float
+    of_rates: bool = False
 
     @property
     def sentence(self) -> str:
         """One sentence with the drivers and the time."""
         *others, last = self.joints
         who = f"the drivers of {', '.join(others)} and {last} contradict each other"
-        return (
-            f"{who}: they differ by {self.gap:.2g} lengths of the mechanism or rad at t = {self.time:.6g} s"
-        )
+        what, unit = ("their rates", " per s") if self.of_rates else ("they", "")
+        gap = f"{self.gap:.2g} lengths of the mechanism or rad{unit}"
+        return f"{who}: {what} differ by {gap} at t = {self.time:.6g} s"
 
     @property
     def fault(self) -> str:
@@ -71,24 +79,93 @@ def refuse_conflict(scene: Scene, until: float | None = None) -> None:
         raise SceneError([found.fault])
 
 
+class _Limits(NamedTuple):
+    """Differences of motions (lengths of the mechanism or rad) and of rates (over s) that are rounding."""
+
+    gap: float
+    rate: float
+
+
 def _first_conflict(model: Model, until: float) -> Conflict | None:
-    q = model.start()
-    terms = model.terms(0.0, q)
-    drivers = _driver_rows(model)
-    dropped = _dependent_drivers(model, terms, drivers)
-    if not dropped:
-        return None
-    kept = np.setdiff1d(np.arange(model.m), list(dropped))
-    for time in np.linspace(0.0, until, COMPARED_TIMES):
-        q, terms = _posed(model, float(time), q, kept)
+    times, limits = _compared(model, until)
+    q, every, drivers = model.start(), np.arange(model.m), _driver_rows(model)
+    for k, time in enumerate(times.tolist()):
+        before, (q, terms) = q, _posed(model, time, q, every)
         gaps = np.abs(terms.phi) / lengths_of_rows(terms.blocks, model.length)
-        if gaps[kept].max(initial=0.0) > CONFLICT:
-            return None  # a dead position: the other drivers cannot be followed
-        row = max(dropped, key=lambda row: gaps[row])
-        if gaps[row] > CONFLICT:
-            still = _dependent_drivers(model, terms, drivers)
-            return Conflict(still[row], float(time), float(gaps[row])) if row in still else None
+        if gaps.max(initial=0.0) > limits.gap:
+            return _of_motions(model, time, before, drivers, limits)
+        rows, rates = unit_equations(terms.jacobian * model.units, terms.nu)
+        off = np.abs(rows @ least_norm(rows, rates, DEPENDENT_DRIVER) - rates)
+        if off.max(initial=0.0) > limits.rate:
+            return _of_rates(model, time, terms, drivers, limits)
+        if k == 1 and not _dependent_drivers(model, terms, drivers):
+            return None
     return None
+
+
+def _compared(model: Model, until: float) -> tuple[np.ndarray, _Limits]:
+    """Return times (k,) at which drivers are compared, and the limits of differences.
+
+    Times are irregular, so that no sine vanishes at all of them, and contain the inner rows of tables.
+    """
+    even = np.linspace(0.0, until, EVEN_TIMES)
+    values = _driven_way(model.scene, model.length, even)
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(values)).max(axis=0))])
+    paced = np.interp(np.arange(0.0, way[-1], PACE)[:MOST_TIMES], way, even)
+    places = np.arange(COMPARED_TIMES - 1)
+    shifted = until * (places + 0.8 * (places * GOLDEN % 1.0)) / (COMPARED_TIMES - 1)
+    rows = [t for driver in model.scene.driver for t, _ in driver.table or () if 0.0 < t < until]
+    times = np.unique(np.concatenate([shifted, paced, rows, [until]]))[:MOST_TIMES]
+    gap = max(CONFLICT, ROUNDED * np.abs(values).max())
+    rate = RATE_CONFLICT * fastest_rate(model.scene, model.length, until) + RATE_SHARE / (until or np.inf)
+    return times, _Limits(gap, rate)
+
+
+def fastest_rate(scene: Scene, length: float, until: float) -> float:
+    """Return the largest rate of a driver up to a time (s), in lengths (m) or rad per s."""
+    even = np.linspace(0.0, until, COMPARED_TIMES)
+    steps = np.diff(_driven_way(scene, length, even))
+    return float(np.abs(steps).max(initial=0.0) / even[1]) if until > 0.0 else 0.0
+
+
+def _driven_way(scene: Scene, length: float, times: np.ndarray) -> np.ndarray:
+    """Return the values (drivers, k) of drivers at times (k,), in lengths (m) or rad."""
+    slides = {joint.name for joint in scene.joint if joint.facts.driven == "displacement"}
+    values = [d.values(times) / (length if d.joint in slides else 1.0) for d in scene.driver]
+    return np.reshape(values, (-1, len(times)))
+
+
+def _of_motions(
+    model: Model, time: float, q: np.ndarray, drivers: dict[int, str], limits: _Limits
+) -> Conflict | None:
+    """Return the conflict of motions at a time (s); None if the other drivers come to a dead position.
+
+    The coordinates q (7 nb,) satisfy all rows a little earlier.
+    """
+    _, terms = _posed(model, time, q, np.arange(model.m))
+    dropped = _dependent_drivers(model, terms, drivers)
+    kept = np.setdiff1d(np.arange(model.m), list(dropped))
+    _, terms = _posed(model, time, q, kept)
+    gaps = np.abs(terms.phi) / lengths_of_rows(terms.blocks, model.length)
+    if not dropped or gaps[kept].max(initial=0.0) > limits.gap:
+        return None
+    row = max(dropped, key=lambda row: gaps[row])
+    still = _dependent_drivers(model, terms, drivers)
+    return Conflict(still[row], time, float(gaps[row])) if row in still and gaps[row] > limits.gap else None
+
+
+def _of_rates(
+    model: Model, time: float, terms: Terms, drivers: dict[int, str], limits: _Limits
+) -> Conflict | None:
+    """Return the conflict of rates at a time (s) and a pose; None if the other drivers have none."""
+    dropped = _dependent_drivers(model, terms, drivers)
+    rows, rates = unit_equations(terms.jacobian * model.units, terms.nu)
+    kept = np.setdiff1d(np.arange(model.m), list(dropped))
+    off = np.abs(rows @ least_norm(rows[kept], rates[kept], DEPENDENT_DRIVER) - rates)
+    if not dropped or off[kept].max(initial=0.0) > limits.rate:
+        return None
+    row = max(dropped, key=lambda row: off[row])
+    return Conflict(dropped[row], time, float(off[row]), of_rates=True)
 
 
 def _driver_rows(model: Model) -> dict[int, str]:

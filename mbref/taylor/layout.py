@@ -77,6 +77,7 @@ class SeriesOptions(NamedTuple):
     accurate_order: int = 0
     velocity_change: float = 0.0  # relative velocity change of a perturbed run
     start_distance: float = 0.0  # m or rad; largest distance of the series from the start
+    rest_speed: float = 0.0  # m/s or rad/s; a slower driven motion starts from rest
     start_freedoms: int = 0  # degrees of freedom at the start, from singular values
     follows_drivers: int = 0  # 1 if steps are predictor steps away from singular positions
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 
+from mbref.equations.driver_conflicts import fastest_rate
 from mbref.input_error import InputError
+from mbref.scene import Scene
 from mbref.stepping.limits import GENERATED, GENERIC
 from mbref.stepping.run import Run
-from mbref.taylor.crossing.thresholds import MIN_CHANGE, START_ERROR
+from mbref.taylor.crossing.thresholds import MIN_CHANGE, START_ERROR, START_REST
 from mbref.taylor.layout import SeriesOptions
 
 EXACT, EXACT_ORDER = 1e-13, 22  # tolerance and least order of high-accuracy steps
@@ -41,9 +43,15 @@ def series_options(run: Run) -> SeriesOptions:
         accurate_order=max(order, EXACT_ORDER) if run.model.closed_loops else order,
         velocity_change=max(run.memory.control.rtol, MIN_CHANGE),
         start_distance=START_ERROR * max(1.0, run.model.length),
+        rest_speed=rest_speed(run.scene, run.model.length, run.times[-1]) if freedoms == 0 else 0.0,
         start_freedoms=freedoms,
         follows_drivers=follows_drivers,
     )
+
+
+def rest_speed(scene: Scene, length: float, until: float) -> float:
+    """Return the speed (m/s or rad/s) up to which a motion that drivers prescribe starts from rest."""
+    return START_REST * max(1.0, length) * fastest_rate(scene, length, until)
 
 
 def order_of(tolerance: float, wanted: float, code: str) -> int:

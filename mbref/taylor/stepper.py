@@ -26,7 +26,7 @@ from mbref.taylor.geometry import equations_of
 from mbref.taylor.mode import REGULAR
 from mbref.taylor.sample_completion import complete_samples
 from mbref.taylor.series_memory import acquire_memory, put_equations
-from mbref.taylor.series_options import series_options
+from mbref.taylor.series_options import rest_speed, series_options
 from mbref.taylor.stepping import advance_series, enter_series
 
 # expected steps above which generated code saves more time than its generation takes
@@ -100,7 +100,11 @@ class SeriesStepper:
         follows_drivers = bool(self._options.follows_drivers)
         varied, alike = equations_of_all(packs, q, places, self._moving, follows_drivers, self.taylor)
         distances = START_ERROR * np.maximum(1.0, packs.length)
-        return [(self.taylor.options, distances, "start_distance"), *varied], alike
+        own = [(distances, "start_distance")]
+        if self._options.rest_speed > 0.0:
+            until, pairs = self.run.times[-1], zip(packs.scenes, packs.length, strict=True)
+            own.append((np.array([rest_speed(*pair, until) for pair in pairs]), "rest_speed"))
+        return [*((self.taylor.options, *entry) for entry in own), *varied], alike
 
     def advance_once(self) -> tuple[int, float]:
         """Advance by one call of kernels; return the status, and the process CPU time of the stepping alone

@@ -61,7 +61,7 @@ def misses_state(memory):
     state, before = memory.run.state, memory.run.previous
     copy_state(state, before)
     put_terms(memory.series.terms, memory)
-    moved, changed, speed = 0.0, 0.0, largest(before.velocities)
+    moved, changed, speed = 0.0, 0.0, larger(largest(before.velocities), memory.options.rest_speed)
     for i in range(state.coordinates.shape[0]):
         moved = larger(moved, state.coordinates[i] - before.coordinates[i])
     for i in range(state.velocities.shape[0]):

@@ -71,6 +71,7 @@ MIN_GAIN = 0.5  # step without the pole / with it: otherwise too many orders are
 # --- start ----------------------------------------------------------------------------------------------
 START_ERROR = 2e-7  # scene lengths, rad, or / fastest velocity: largest error of the start
 START_ERROR_DRIVEN = 0.05  # velocity error / fastest velocity: drivers hold a motion whose start is rounded
+START_REST = 1e-9  # speed / fastest speed of drivers: a driven motion with less starts from rest
 REST_PIVOT = 5e-6  # pivot of unit rows: below it, rounding turns a motion from rest by 1e-5
 REST_TURN = 3e-8  # change of direction / √pivot: rounding turns a motion from rest by less
 # --- departure along a branch ---------------------------------------------------------------------------

@@ -46,16 +46,48 @@ def test_two_drivers_of_one_slide_that_agree_move_it():
     assert np.allclose(run.position[:, 0, 0], [0.0, -0.5], atol=1e-12)
 
 
-def test_driver_by_a_table_agrees_with_a_line_only_if_its_points_lie_on_it():
-    """The line is 0.4 t m; points of the other table are 10 mm off from 0.8 s on."""
-    rows = [(t, 0.4 * t) for t in (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)]
-    line = {"joint": "left", "polynomial": [0.0, 0.4]}
-    scene = twice_driven([0.0, 0.4], [0.0, 0.4])
-    agreed = scene.with_(driver=[line, {"joint": "right", "table": rows}])
-    assert simulate(agreed, times=[1.0]).outcome.name == "COMPLETED"
-    bent = [(t, x if t < 0.7 else x + 0.01) for t, x in rows]
-    with pytest.raises(SceneError, match="contradict each other"):
-        simulate(scene.with_(driver=[line, {"joint": "right", "table": bent}]), times=[1.0])
+ROWS = [(t, 0.4 * t) for t in np.linspace(0.0, 1.0, 101).tolist()]  # a table of 0.4 t m
+WAVE = {"amplitude": 1e-11, "frequency": 1e3}
+SEEN_NOWHERE = {"amplitude": 1e-7, "frequency": 200 * np.pi, "phase": np.pi / 2}  # zero at t = 0, 0.01 …
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"polynomial": [0.0, 0.4], "sine": WAVE},  # rates differ by 1e-8 m/s
+        {"polynomial": [-1e-7, 0.4], "sine": SEEN_NOWHERE},
+        {"table": [*ROWS[:50], (0.5, 0.2 + 1e-7), *ROWS[51:]]},
+    ],
+)
+def test_drivers_that_differ_only_in_rate_or_between_even_times_are_named(other):
+    """The first driver moves the slide by 0.4 t m."""
+    scene = twice_driven([0.0, 0.4], [0.0]).with_(
+        driver=[{"joint": "left", "polynomial": [0.0, 0.4]}, {"joint": "right", **other}]
+    )
+    with pytest.raises(SceneError, match="the drivers of left and right contradict each other"):
+        simulate(scene, times=[1.0])
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_table_of_13_digits_agrees_with_its_cubic_from_rest(order):
+    """Both are 0.3 t² - 0.1 t³ m; the rates at the start differ by rounding."""
+    rows = [(t, round(0.3 * t**2 - 0.1 * t**3, 13)) for t in np.linspace(0.0, 1.0, 41)]
+    drivers = [{"joint": "left", "polynomial": [0.0, 0.0, 0.3, -0.1]}, {"joint": "right", "table": rows}]
+    run = simulate(twice_driven([0.0], [0.0]).with_(driver=drivers[::order]), times=[0.5, 1.0])
+    assert run.outcome.name == "COMPLETED"
+    assert np.allclose(run.position[:, 0, 0], [0.0625, 0.2], atol=1e-11)
+
+
+@pytest.mark.parametrize("further", [0.1, 1e-8])
+def test_drivers_of_a_flat_parallelogram_are_named_unless_both_cranks_turn_alike(further):
+    """It starts flat, where rows of both drivers are independent."""
+    alike = [{"joint": name, "polynomial": [0.0, 0.4]} for name in "AD"]
+    scene = parallelogram(0.0, 1.0)
+    run = simulate(scene.with_(driver=alike), times=[1.0])
+    assert run.position[0, 1, 1] == pytest.approx(np.sin(0.4), abs=1e-12)
+    other = {"joint": "D", "polynomial": [0.0, 0.4, further]}
+    with pytest.raises(SceneError, match="the drivers of A and D contradict each other"):
+        simulate(scene.with_(driver=[alike[0], other]), times=[1.0])
 
 
 def test_drivers_of_both_cranks_of_a_parallelogram_contradict_each_other_unless_they_turn_alike():
