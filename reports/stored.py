@@ -14,7 +14,7 @@ from crosscheck.study.grid import Record
 from crosscheck.study.record_shape import Picture, Run, Timing, Truth, Verdicts, checked
 from crosscheck.study.record_view import of_scenes, with_time
 from crosscheck.study.store import read, unpacked
-from mbref.records import json_content
+from mbref.records import RecordsError, json_content
 from mbref.scene import Scene
 
 from .runs import SceneRuns, by_scene
@@ -40,11 +40,23 @@ def _groups(folder: Path) -> list[SceneRuns]:
     scenes = [Scene.from_file(path) for path in sorted((folder / "scenes").glob("*.toml"))]
     named = {scene.name: scene for scene in scenes}
     times = read(folder / "timings.jsonl", Timing)
-    stored = (read(folder / f"{name}.jsonl", shape) for name, shape in SHAPES.items())
+    stored = [_of_known_scenes(folder / f"{name}.jsonl", shape, named) for name, shape in SHAPES.items()]
     records, *more = (of_scenes(list(found.values()), scenes) for found in stored)
     gates = [r for r in records if _is_gate(named[r["scene"]], r)]
     runs = [with_time(r, times) for r in records if not any(r is gate for gate in gates)]
     return by_scene(_ordered(runs), named, gates, *more)
+
+
+def _of_known_scenes(
+    path: Path, shape: type[Picture] | type[Truth], named: dict[str, Scene]
+) -> dict[str, Record]:
+    """Return the records of a file by key; raises RecordsError if a record's scene has no file."""
+    found = read(path, shape)
+    for record in found.values():
+        if record["scene"] not in named:
+            what = f"scene: no file of scenes/ has the name {record['scene']!r}"
+            raise RecordsError(f"{path}: record {record['key'][:12]!r}: {what}; restore it")
+    return found
 
 
 def verified(folder: Path) -> list[Record]:

@@ -22,6 +22,10 @@ FAULTS: list[tuple[str, Any]] = [
     ("scene", 1),
     ("asked", {"engine": "mbref"}),
     ("versions", []),
+    ("bodies", {"crank": {"position": [[0.0, 0.0]] * 2, "orientation": []}}),
+    ("reactions", {"A": [["far"] * 6] * 2}),
+    ("angles", {"A": [10**400, 0.0]}),
+    ("crossings", [{"time": 0.1}]),
 ]
 
 
@@ -64,6 +68,20 @@ def test_faulty_field_of_a_record_is_named(field, value, tmp_path, capsys):
     """The field is missing (None) or has a value of another kind; k1 is the record's key."""
     said = refused(capsys, folder(tmp_path / "r", record_with(field, value)))
     assert f"record 'k1': {field}" in said
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "said"),
+    [
+        ("reactions", {"A": [[0.0] * 6]}, "A has 1 rows for 2 times"),
+        ("scene", "lost", "no file of scenes/ has the name 'lost'"),
+    ],
+)
+def test_record_whose_parts_do_not_fit_is_named(field, value, said, tmp_path, capsys):
+    """Reactions at one of two times; a scene whose file is lost."""
+    assert report(["--render", str(folder(tmp_path / "r", record_with(field, value)))]) == 2
+    shown = capsys.readouterr().err
+    assert "records.jsonl: record 'k1'" in shown and said in shown and shown.count("\n") == 1
 
 
 @pytest.mark.parametrize("name", ["timings.jsonl", "truths.jsonl", "motions.jsonl", "conformance/x.json"])
