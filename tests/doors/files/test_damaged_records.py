@@ -40,7 +40,7 @@ def folder(place: Path, lines: bytes) -> Path:
 def record_with(field: str, value: Any = None) -> bytes:
     """Return a line of a right record in which a field has another value, or is missing."""
     record = copy.deepcopy(RECORD)
-    del record[field]
+    record.pop(field, None)
     return json.dumps(record if value is None else {**record, field: value}).encode() + b"\n"
 
 
