@@ -18,6 +18,7 @@ from crosscheck.study.fair_timing import force_differences, model_difference, mo
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import drawn, error_text, varied_settings
 from mbref.motions.trajectory import Outcome, Trajectory
+from mbref.records import RecordsError
 from mbref.scene import Scene
 
 LEVELS, WRONG = ERROR_LEVELS, FALSE_SUCCESS
@@ -114,6 +115,10 @@ class Run:
 
     @cached_property
     def trajectory(self) -> Trajectory:
+        for field in ("bodies", "reactions"):
+            if self.record.get(field) is None:
+                key = self.record["key"][:12]
+                raise RecordsError(f"records.jsonl: record {key!r}: {field}: field required by pictures")
         return Trajectory.from_record(self.scene, self.record)
 
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from crosscheck.engine import engine_names
 from crosscheck.judge.model_identity import gate_times
 from crosscheck.study.grid import Record
-from crosscheck.study.record_shape import Picture, Run, Timing, Truth, Verdicts, checked
+from crosscheck.study.record_shape import Picture, Timing, Truth, Verdicts, WholeRun, checked
 from crosscheck.study.record_view import of_scenes, with_time
 from crosscheck.study.store import read, unpacked
 from mbref.records import RecordsError, json_content
@@ -21,7 +22,7 @@ from .runs import SceneRuns, by_scene
 
 # shape of the records of each file
 SHAPES: dict[str, type[Picture] | type[Truth]] = {
-    "records": Run,
+    "records": WholeRun,
     "truths": Truth,
     "motions": Picture,
     "branches": Picture,
@@ -50,13 +51,24 @@ def _groups(folder: Path) -> list[SceneRuns]:
 def _of_known_scenes(
     path: Path, shape: type[Picture] | type[Truth], named: dict[str, Scene]
 ) -> dict[str, Record]:
-    """Return the records of a file by key; raises RecordsError if a record's scene has no file."""
+    """Return the records of a file by key; raises RecordsError if a record's scene has no file, or
+    lacks its bodies."""
     found = read(path, shape)
     for record in found.values():
-        if record["scene"] not in named:
-            what = f"scene: no file of scenes/ has the name {record['scene']!r}"
-            raise RecordsError(f"{path}: record {record['key'][:12]!r}: {what}; restore it")
+        scene, motion = named.get(record["scene"]), record.get("motion") or record
+        if scene is None:
+            fault = f"scene: no file of scenes/ has the name {record['scene']!r}"
+        elif of_scenes([record], [scene]) and not _fits(motion.get("bodies"), scene):
+            fault = "bodies: are not the bodies of the scene"
+        else:
+            continue
+        raise RecordsError(f"{path}: record {record['key'][:12]!r}: {fault}; restore it")
     return found
+
+
+def _fits(states: dict[str, Any] | None, scene: Scene) -> bool:
+    """Return whether a motion has states of all bodies of a scene, or none."""
+    return not states or set(states) == {body.name for body in scene.body}
 
 
 def verified(folder: Path) -> list[Record]:

@@ -15,6 +15,7 @@ SHARE = 1e-3  # fraction of a column's range; a coarser rounding is stated besid
 COARSEST = 0.1
 FINE = 1e-12  # fraction of a quantity's size; a finer rounding is not stated, also of constant columns
 CLOSE = 1 - 1e-9  # fraction of the bound: smaller errors do not move a sample; the rest is for rounding
+INNER = 1e-3  # weight of errors within their bounds: of times without a larger error, a middle one is taken
 EVEN = 1e-3  # fraction of half a unit, by which evenly spaced times may differ in double precision
 SEARCH = 60  # steps of the search for a time within its rounding; each leaves two thirds of the interval
 Columns = Mapping[str, np.ndarray]
@@ -127,10 +128,11 @@ def aligned(compared: Compared, half: np.ndarray, later: Mapping[str, Callable[.
         return rate * shift + curve * shift**2 / 2
 
     def excess(shift: np.ndarray) -> np.ndarray:
-        return np.asarray(np.maximum(np.abs(left - moved(shift)) / bound - CLOSE, 0.0).sum(axis=0))
+        size = np.abs(left - moved(shift)) / bound
+        return np.asarray(np.maximum(size - CLOSE, 0.0).sum(axis=0) + INNER * (size**2).mean(axis=0))
 
     shift = np.zeros_like(high)
-    if excess(shift).any():
+    if (np.abs(left) > CLOSE * bound).any():
         for _ in range(SEARCH):
             third = (high - low) / 3
             is_left = excess(low + third) <= excess(high - third)

@@ -220,7 +220,9 @@ def _rotation_vectors(q: np.ndarray, first: float) -> np.ndarray:
 def _exchanges(d: Difference) -> Iterator[Stated]:
     """Return columns that hold other columns of the exact motion, also of another quantity, body or joint."""
     off = [n for n in d.recorded if not d.is_small(n, d.squares[n])]
-    names = [*off, *(n for n in d.recorded if n not in off)]
+    # a constant says nothing of its origin
+    moving = [n for n in d.recorded if np.ptp(d.exact[n]) > np.max(d.allowed.get(n, 0.0))]
+    names = sorted(moving, key=lambda n: n not in off)
     held: dict[str, str] = {}
     for name in off:
         ask()

@@ -92,6 +92,16 @@ class _Body(_Shape):
     angular_acceleration: Vectors | None = None
 
 
+class _WholeCost(Cost):
+    model_config = ConfigDict(strict=True, extra="forbid")
+    build_seconds: float
+    steps: int
+    rejected: int = 0
+    rhs: int = 0
+    factorisations: int = 0
+    newton: int = 0
+
+
 class Ladder(_Shape):
     """Record of a run without its cost, as ladders of stability store it."""
 
@@ -131,8 +141,8 @@ class Measured(Refused):
     cost: Cost
 
 
-class Picture(Ladder):
-    """Record of a run for a picture: its motion may have no velocities, or may be left out."""
+class Run(Ladder):
+    """Record of a run (`study.grid.record_of`), as differences read it; its motion may be left out."""
 
     settings: dict[str, Any]
     cost: Cost
@@ -148,21 +158,28 @@ class Picture(Ladder):
     error_estimate: _Estimate | None = None
 
     @model_validator(mode="after")
-    def _has_a_row_for_each_time(self) -> Picture:
+    def _has_a_row_for_each_time(self) -> Run:
         parts = [self.reactions, self.open_reactions, self.angles]
         tables = {name: rows for part in parts for name, rows in (part or {}).items()}
         _compare(self.times, self.bodies or {}, tables)
         return self
 
 
-class Run(Picture):
-    """Record of a run (`study.grid.record_of`); its motion may be left out."""
+class Picture(Run):
+    """Record of a run for a picture: its motion may have no velocities, or may be left out."""
+
+    method: str
+    cost: _WholeCost
+
+
+class WholeRun(Picture):
+    """Record of a run as sections of a report read it; its motion may be left out."""
 
     @model_validator(mode="after")
-    def _has_velocities(self) -> Run:
+    def _has_velocities(self) -> WholeRun:
         for name, body in (self.bodies or {}).items():
             if body.velocity is None or body.angular_velocity is None:
-                raise ValueError(f"{name} has no velocities")
+                raise ValueError(f"velocities of {name} are missing")
         return self
 
 
@@ -173,7 +190,7 @@ def _compare(times: list[float], bodies: dict[str, _Body], tables: dict[str, lis
     }
     for name, rows in (states | tables).items():
         if len(rows) != len(times):
-            raise ValueError(f"{name} has {len(rows)} rows for {len(times)} times")
+            raise ValueError(f"rows of {name}: {len(rows)}, for {len(times)} times")
 
 
 class _Motion(_Shape):

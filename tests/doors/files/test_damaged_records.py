@@ -73,7 +73,7 @@ def test_faulty_field_of_a_record_is_named(field, value, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("field", "value", "said"),
     [
-        ("reactions", {"A": [[0.0] * 6]}, "A has 1 rows for 2 times"),
+        ("reactions", {"A": [[0.0] * 6]}, "rows of A: 1, for 2 times"),
         ("scene", "lost", "no file of scenes/ has the name 'lost'"),
     ],
 )

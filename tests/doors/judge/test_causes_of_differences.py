@@ -175,6 +175,7 @@ EVERYWHERE = {
     "drift": (drifting, NOTHING),
     "noise": (noisy, NOTHING),
     "shuffled rows": (shuffled, NOTHING),
+    "zeros": (scaled(0.0, "r.velocity.x", "d.velocity.x"), NOTHING),
 }
 MORE = {  # slow everywhere
     "inches": (scaled(1 / 0.0254, ".position"), "in inches, not m"),

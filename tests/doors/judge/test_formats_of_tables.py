@@ -133,7 +133,12 @@ def test_column_of_zeros_is_too_coarse_to_be_right(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "form", ["%.6g", *(pytest.param(f, marks=pytest.mark.slow) for f in ("%.3f", "%.4g", "single precision"))]
+    "form",
+    [
+        "%.8f",
+        "%.6g",
+        *(pytest.param(f, marks=pytest.mark.slow) for f in ("%.3f", "%.4g", "single precision")),
+    ],
 )
 def test_times_that_are_rounded_are_compared_within_their_rounding(form: str, tmp_path: Path) -> None:
     """Exact states at multiples of 1/71 s are right though their times are written with few digits. With one
