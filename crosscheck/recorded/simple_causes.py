@@ -220,9 +220,7 @@ def _rotation_vectors(q: np.ndarray, first: float) -> np.ndarray:
 def _exchanges(d: Difference) -> Iterator[Stated]:
     """Return columns that hold other columns of the exact motion, also of another quantity, body or joint."""
     off = [n for n in d.recorded if not d.is_small(n, d.squares[n])]
-    # a constant says nothing of its origin
-    moving = [n for n in d.recorded if np.ptp(d.exact[n]) > np.max(d.allowed.get(n, 0.0))]
-    names = sorted(moving, key=lambda n: n not in off)
+    names = [*off, *(n for n in d.recorded if n not in off)]
     held: dict[str, str] = {}
     for name in off:
         ask()
@@ -233,6 +231,8 @@ def _exchanges(d: Difference) -> Iterator[Stated]:
             return
     if not held or all(_of_one_vector(*pair) for pair in held.items()):
         return  # ``axes`` says which components are exchanged
+    if all(np.ptp(d.exact[n]) <= np.max(d.allowed.get(n, 0.0)) for n in held.values()):
+        return  # constants do not show where they come from
     title, other = ", ".join(held), ", ".join(held.values())
     says = f"hold{'s' * (len(held) == 1)} {other} of the exact motion"
     if len(held) == 2 and set(held) == set(held.values()):
