@@ -15,7 +15,7 @@ from mbref.scene.joints import ANGLE
 from mbref.scene.loads import LoadEntry
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DriverMotion:
     """Force or torque, and power, that a driver supplies at k sample times (inverse dynamics).
 
@@ -48,7 +48,7 @@ class DriverMotion:
     open: np.ndarray | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LoadMotion:
     """Length, angle or displacement, rate, force or torque, power and energy of a load at k sample times.
 

@@ -16,7 +16,7 @@ from mbref.motions.trajectory import Trajectory
 RATIO, LEAST_WARNED = 1e3, 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ErrorEstimate:
     """Estimated global error of a motion at its k samples.
 

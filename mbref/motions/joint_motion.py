@@ -13,7 +13,7 @@ from mbref.scene import Joint, Scene
 from mbref.scene.joints import ANGLE, Coordinate
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class JointMotion:
     """Motion of the second body of a joint relative to the first, from t = 0, at k sample times.
 

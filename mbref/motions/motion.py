@@ -22,11 +22,12 @@ from mbref.motions.joint_motion import JointMotion, joint_motion
 from mbref.motions.maxima import ReactionMaxima, reaction_maxima
 from mbref.motions.output_units import in_units
 from mbref.motions.outputs import all_columns, chosen
+from mbref.motions.restart import scene_at
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Motion(Trajectory):
     """A trajectory with its scene: the motion of body ``motion["rod"]`` and of joint ``motion.joint("A")``.
 
@@ -86,6 +87,29 @@ class Motion(Trajectory):
         """Kinetic plus potential energy, J, shape (k,), constant without drivers, dampers, forces and
         moments."""
         return self.kinetic_energy + self.potential_energy
+
+    def scene_at(self, t: float) -> Scene:
+        """Return the scene that starts with the state at a sample time, and then moves as this motion.
+
+        Its time counts from t: drivers and factors of loads are shifted, natural angles and displacements of
+        springs at joints count from the new poses, and couplings have no offsets.
+
+        Parameters
+        ----------
+        t : float
+            A sample time, s.
+
+        Returns
+        -------
+        Scene
+            With the remaining duration.
+
+        Raises
+        ------
+        InputError
+            If the motion has no sample at t; the message has the nearest one.
+        """
+        return scene_at(self.mechanism, self, t)
 
     def driver(self, joint: str) -> DriverMotion:
         """Return force or torque, and power that the driver of a joint supplies.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -72,7 +72,7 @@ class Cost:
     newton: int = 0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BodyMotion:
     """Motion of one body at k sample times, in the frames and units of Trajectory.
 
@@ -103,9 +103,12 @@ class BodyMotion:
 PER_BODY = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Trajectory:
     """Poses of all bodies at the sample times that a run reached.
+
+    It behaves as a dictionary of the bodies' motions by name: ``motion["rod"]``, ``"rod" in motion``,
+    ``for name in motion``, ``len(motion)``. Two trajectories are equal if they are one object.
 
     k sample times were reached, the scene has nb bodies, and all vectors are in the world frame.
 
@@ -174,6 +177,22 @@ class Trajectory:
             f"<{type(self).__name__} of {self.scene!r} by {self.engine} {self.method}: {self.outcome.label}, "
             f"{len(self.times)} samples to t = {self.t_end:g} s>"
         )
+
+    def __len__(self) -> int:
+        """Return the number of bodies; ``times.size`` is the number of samples."""
+        return len(self.bodies)
+
+    def __iter__(self) -> Iterator[str]:
+        """Yield the names of the bodies, as a dictionary does."""
+        return iter(self.bodies)
+
+    def __contains__(self, name: object) -> bool:
+        """Return whether a body has this name."""
+        return name in self.bodies
+
+    def _ipython_key_completions_(self) -> list[str]:
+        """Return the names that an interactive shell offers in brackets."""
+        return list(self.bodies)
 
     def __getitem__(self, name: str) -> BodyMotion:
         """Return the motion of one body.

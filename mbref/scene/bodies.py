@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Self
 
+import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from mbref.scene.fields import (
@@ -116,3 +117,10 @@ class Driver(TimeFunction):
     @property
     def coefficients(self) -> tuple[float, ...]:
         return self.polynomial
+
+    def from_time(self, t: float) -> Driver:
+        """Return the driver as a function of the time since t (s), of the motion since then."""
+        fields = self._delayed(t)
+        at_start = float(self.model_copy(update={**fields}).values(np.zeros(1))[0])
+        first, *others = fields["polynomial"]
+        return self.model_copy(update={**fields, "polynomial": (first - at_start, *others)})

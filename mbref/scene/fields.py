@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from reprlib import Repr
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from mbref.printable import checked_name
 from mbref.scene.units import Quantity, number_in
+
+if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass as ModelType
+else:
+    ModelType = type(BaseModel)
 
 # limits of numbers, whose products and squares then stay within double precision
 LARGEST, SMALLEST = 1e40, 1e-40
@@ -173,7 +178,29 @@ def direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
     return v
 
 
-class SceneEntry(BaseModel):
+class EntryType(ModelType):
+    """Class of the classes of entries: faults of an entry made in Python are a SceneError, as in a scene."""
+
+    refusal: Callable[
+        [ValidationError, Iterable[str]], Exception
+    ]  # which the module of Scene sets, as it knows all entries
+
+    def __call__(cls, *values: Any, **fields: Any) -> Any:
+        """Return the entry with these fields; raises SceneError for each fault."""
+        try:
+            return super().__call__(*values, **fields)
+        except ValidationError as error:
+            raise EntryType.refusal(error, cls.model_fields) from None
+
+
+class SceneEntry(BaseModel, metaclass=EntryType):
     """Base class of the entries of a scene: a frozen table without unknown fields."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Raise AttributeError, because entries are frozen."""
+        what = type(self).__name__
+        raise AttributeError(
+            f"{what}.{name} cannot be set: a {what} is frozen; scene.with_(...) returns a changed copy"
+        )

@@ -8,6 +8,7 @@ Splines, 1978, chapter IV).
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator
 from typing import Annotated, Any, NamedTuple
 
@@ -124,6 +125,18 @@ class TimeFunction(SceneEntry):
         powers = (times - begin)[:, None] ** np.arange(4)
         return np.asarray(part * smooth + (cubic * powers).sum(axis=1))
 
+    def _delayed(self, t: float) -> dict[str, Any]:
+        """Return the fields of the function that has at 0 the value, and at every time later, of this one at
+        t (s)."""
+        terms = np.polynomial.Polynomial(self.coefficients)(np.polynomial.Polynomial([t, 1.0])).coef
+        fields: dict[str, Any] = {"polynomial": tuple(terms.tolist())}
+        if self.sine is not None:
+            phase = self.sine.phase + self.sine.frequency * t
+            fields["sine"] = self.sine.model_copy(update={"phase": math.remainder(phase, 2 * math.pi)})
+        if self.table is not None:
+            fields["table"] = tuple((time - t, value) for time, value in self.table)
+        return fields
+
     @property
     def is_constant(self) -> bool:
         """True if the value never changes."""
@@ -157,3 +170,10 @@ class Factor(TimeFunction):
     @property
     def interval(self) -> tuple[float, float]:
         return self.start, np.inf if self.stop is None else self.stop
+
+    def from_time(self, t: float) -> Factor | None:
+        """Return the factor as a function of the time since t (s); None if it is switched off from t on."""
+        if self.stop is not None and self.stop <= t:
+            return None
+        stop = None if self.stop is None else self.stop - t
+        return self.model_copy(update={**self._delayed(t), "start": max(0.0, self.start - t), "stop": stop})

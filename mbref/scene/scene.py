@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -10,7 +10,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from mbref.files import write
 from mbref.scene.bodies import Body, Driver
-from mbref.scene.fields import Acceleration, LaterTime, Name, SceneEntry, Three
+from mbref.scene.fields import Acceleration, EntryType, LaterTime, Name, SceneEntry, Three
 from mbref.scene.functions import Factor, Sine
 from mbref.scene.joints import Coordinate, Coupling, Joint
 from mbref.scene.loads import Load
@@ -205,3 +205,12 @@ class Scene(SceneEntry):
 FIELDS_OF_TABLES = {"": tuple(Scene.model_fields)} | {
     table.__name__.lower(): tuple(table.model_fields) for table in (Body, Coupling, Driver, Sine, Factor)
 }
+
+
+def _refusal(error: ValidationError, fields: Iterable[str]) -> SceneError:
+    """Return the faults of an entry with these fields that was made alone."""
+    known = {**FIELDS_OF_TABLES, "": tuple(fields)}
+    return SceneError([f"{path}: {message}" for path, message in field_faults(error, known)])
+
+
+EntryType.refusal = _refusal

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from mbref.cli.scene_files import template
-from mbref.design.along_motion import along_motion, general_pose
+from mbref.design.along_motion import along_motion
 from mbref.design.assemble import assemble
 from mbref.design.exchange import exchanges
 from mbref.equations.counts import counts
 from mbref.equations.model import Model
-from mbref.equations.placed import placed
 from mbref.scene import Body, Coupling, Driver, Revolute, Scene, SceneError, TorsionSpring
 from mbref.scenes import find_scene
 
@@ -100,24 +99,6 @@ def test_plate_gets_the_lengths_of_its_three_sides():
 def test_sides_that_violate_the_triangle_inequality_are_refused():
     with pytest.raises(SceneError, match=r"body\[crank\]: no link has these lengths"):
         assemble(four_bar_with_flag(), {("A", "B"): 0.5, ("A", "P"): 0.1, ("B", "P"): 0.2})
-
-
-@pytest.mark.parametrize("name", SPATIAL)
-def test_scene_placed_at_another_pose_keeps_its_links_and_closes_its_loops(name):
-    """A link is rigid: the distance of each joint's anchor from the centre of its body does not change when
-    a body moves, here the first one by more than 10 µm."""
-    scene = find_scene(name).with_(driver=())
-    model = Model(scene)
-    elsewhere = placed(model, general_pose(model))
-
-    def arms(scene):
-        places = {body.name: body.position for body in scene.body}
-        ends = [end for joint in scene.joint for end in zip(joint.bodies, joint.anchor_pair, strict=True)]
-        return [math.dist(places[name], anchor) for name, anchor in ends if name in places]
-
-    assert violation(elsewhere) < ROUNDING
-    assert math.dist(scene.body[0].position, elsewhere.body[0].position) > 1e-5
-    assert arms(elsewhere) == pytest.approx(arms(scene), abs=ROUNDING)
 
 
 def test_hinge_with_a_driver_or_a_torsion_spring_is_exchanged_only_for_a_cylindrical_joint():

@@ -17,18 +17,6 @@ def by_sign(eigenvalues):
     return sorted(eigenvalues, key=lambda s: -s.imag)
 
 
-def test_a_pendulum_is_stable_below_and_unstable_above_its_hinge():
-    """s² = ∓ m g l / (J + m l²), to rounding, and the hinge carries the weight."""
-    found = {each.stability: each for each in equilibria(pendulum(), starts=8)}
-    assert set(found) == {"stable", "unstable"} and len(equilibria(pendulum(), starts=8)) == 2
-    rate = np.sqrt(MASS * G * ARM / (INERTIA + MASS * ARM**2))
-    assert np.allclose(found["stable"].eigenvalues, [1j * rate, -1j * rate], rtol=1e-12, atol=1e-12 * rate)
-    assert np.allclose(np.sort(found["unstable"].eigenvalues.real), [-rate, rate], rtol=1e-12)
-    for each, height in ((found["stable"], -ARM), (found["unstable"], ARM)):
-        assert np.allclose(each.scene.body[0].position, (0.0, height, 0.0), atol=POSE)
-        assert np.allclose(each.reactions["A"], [0.0, MASS * G, 0.0, 0.0, 0.0, 0.0], atol=POSE)
-
-
 def test_a_damped_torsion_spring_has_the_roots_of_its_equation():
     """J s² + c s + k = 0 about the natural angle, at which the arm rests. Angles of the equilibrium's scene
     count from its pose: it has the natural angle 0, and is its own equilibrium."""

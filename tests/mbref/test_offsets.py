@@ -45,44 +45,29 @@ def error(found: np.ndarray, exact: np.ndarray) -> float:
     return float(np.abs(found - exact).max() / max(1.0, np.abs(exact).max()))
 
 
+# maker, coupling, offset, ratio r; end (s); inertias J of the first and m of the second coordinate, and the
+# constant acceleration of the first: M / J', -m g r / J' and the nut's fall m g h / J', J' = J + r² m
+STARTS = {
+    "gear pair": (gear_pair, "teeth", 0.4, -0.5, 2.0, 0.03, 0.2, 2.0),
+    "rack": (rack, "teeth", 0.003, 0.05, 1.0, 0.2, 1.5, -1.5 * G * 0.05),
+    "screw": (screw, "thread", 0.2, 0.01, 1.0, 0.02, 2.0, -2.0 * G * 0.01),
+}
+
+
 @pytest.mark.parametrize("method", METHODS)
-def test_gear_pair_starts_at_its_offset_by_the_least_displacement_and_turns_from_there(method):
-    """Least J_A a² + J_B b² with b = c + r a: a = -r J_B c / J and b = J_A c / J, J = J_A + r² J_B. A torque
-    M turns A from there by M t² / 2 J."""
-    times, offset, ratio = np.linspace(0, 2, 21), 0.4, -0.5
-    motion = mbref.simulate(shifted(gear_pair, "teeth", offset), method=method, times=times, rtol=1e-13)
-    inertia = 0.03 + ratio**2 * 0.2
-    turned, (a, b) = 2.0 / inertia * times**2 / 2, (motion.joint(name).angle for name in "AB")
-    assert a[0] == pytest.approx(-ratio * 0.2 / inertia * offset, rel=STEPS)
-    assert b[0] == pytest.approx(0.03 / inertia * offset, rel=STEPS)
-    assert max(error(a - a[0], turned), error(b, offset + ratio * a)) <= CLOSED_FORM
+@pytest.mark.parametrize("of", STARTS)
+def test_coupled_coordinates_start_by_the_least_displacement_and_move_from_there(of, method):
+    """Least J a² + m b² with b = c + r a: a = -r m c / J' and b = J c / J'. From there a torque or a
+    weight moves them with a constant acceleration."""
+    make, name, offset, ratio, end, first, second, force = STARTS[of]
+    times, inertia = np.linspace(0, end, 11), first + ratio**2 * second
+    motion = mbref.simulate(shifted(make, name, offset), method=method, times=times, rtol=1e-13)
+    ends = motion.mechanism.coupled(motion.mechanism.coupling[0])
+    a, b = (getattr(motion.joint(joint.name), coordinate) for joint, coordinate in ends)
+    assert a[0] == pytest.approx(-ratio * second / inertia * offset, rel=STEPS)
+    assert b[0] == pytest.approx(first / inertia * offset, rel=STEPS)
+    assert max(error(a - a[0], force / inertia * times**2 / 2), error(b, offset + ratio * a)) <= CLOSED_FORM
     assert motion.violation.position.max() < CLOSED_FORM
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_rack_starts_at_its_offset_by_the_least_displacement_and_falls_from_there(method):
-    """Least J a² + m b² with b = c + r a, J = 0.2 kg m², m = 1.5 kg; its fall: m g / (m + J / r²) t² / 2."""
-    times, offset, ratio = np.linspace(0, 1, 11), 0.003, 0.05
-    motion = mbref.simulate(shifted(rack, "teeth", offset), method=method, times=times, rtol=1e-13)
-    inertia = 0.2 + ratio**2 * 1.5
-    falls = -1.5 * G / (1.5 + 0.2 / ratio**2) * times**2 / 2
-    a, b = motion.joint("A").angle, motion.joint("B").displacement
-    assert a[0] == pytest.approx(-ratio * 1.5 / inertia * offset, rel=STEPS)
-    assert b[0] == pytest.approx(0.2 / inertia * offset, rel=STEPS)
-    assert max(error(b - b[0], falls), error(b, offset + ratio * a)) <= CLOSED_FORM
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_nut_of_a_screw_starts_at_its_offset_by_the_least_displacement_and_turns_from_there(method):
-    """Least J a² + m b² with b = c + h a, J = 0.02 kg m², m = 2 kg; it turns by m g h / (J + m h²) t² / 2."""
-    times, offset, ratio = np.linspace(0, 1, 11), 0.2, 0.01
-    motion = mbref.simulate(shifted(screw, "thread", offset), method=method, times=times, rtol=1e-13)
-    inertia = 0.02 + ratio**2 * 2.0
-    turns = -2.0 * G * ratio / inertia * times**2 / 2
-    a, b = motion.joint("S").angle, motion.joint("S").displacement
-    assert a[0] == pytest.approx(-ratio * 2.0 / inertia * offset, rel=STEPS)
-    assert b[0] == pytest.approx(0.02 / inertia * offset, rel=STEPS)
-    assert max(error(a - a[0], turns), error(b, offset + ratio * a)) <= CLOSED_FORM
 
 
 @every

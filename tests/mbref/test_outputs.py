@@ -77,16 +77,6 @@ def test_length_rate_and_force_of_a_spring_follow_from_geometry(sprung):
     assert np.allclose(found.power, -force * rate, atol=ACCURACY) and found.torque is None
 
 
-def test_torque_of_a_torsion_spring_and_damper_follows_from_the_angle(sprung):
-    """-k (θ - natural angle) - c θ', with the driver's θ."""
-    theta, turning, _ = angle(TIMES)
-    torque = -STIFFNESS * (theta - TWIST) - DAMPING * turning
-    found = sprung.load_at(1)
-    assert np.allclose(found.angle, theta, atol=ACCURACY) and np.allclose(found.rate, turning, atol=ACCURACY)
-    assert np.allclose(found.torque, torque, atol=ACCURACY) and found.length is None
-    assert np.allclose(found.power, torque * turning, atol=ACCURACY)
-
-
 def test_load_of_a_number_that_does_not_exist_is_refused(sprung):
     with pytest.raises(IndexError, match="no load 3; the scene has 3 loads"):
         sprung.load_at(3)

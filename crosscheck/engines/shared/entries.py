@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from pydantic import ValidationError
-
 from mbref.scene import SceneError
-from mbref.scene.validation import field_faults
 
 Entry = TypeVar("Entry")
 
@@ -18,6 +15,5 @@ def entry(where: str, make: Callable[..., Entry], *values: Any, **fields: Any) -
     the field, for a value that a scene does not have."""
     try:
         return make(*values, **fields)
-    except ValidationError as error:
-        faults = [f"{where}: {path}: {message}" for path, message in field_faults(error, {})]
-        raise SceneError(faults) from None
+    except SceneError as error:
+        raise SceneError([f"{where}: {fault}" for fault in error.faults]) from None

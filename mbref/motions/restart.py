@@ -1,0 +1,74 @@
+"""Scenes that start at a sample of a motion: its state, its joints and loads, and later functions of time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbref import rotations
+from mbref.equations.model import Model
+from mbref.equations.offsets import angles_at_start, assembled
+from mbref.equations.placed import placed_with_springs
+from mbref.input_error import InputError
+from mbref.motions.joint_motion import joint_motion
+from mbref.motions.trajectory import Trajectory
+from mbref.scene import Load, Scene, TorsionSpring
+
+SAME_TIME = 1e-9  # difference of times / largest sample time that is rounding of a user's number
+
+
+def scene_at(scene: Scene, motion: Trajectory, t: float) -> Scene:
+    """Return the scene that starts with the state of a motion at a sample time t (s); raises InputError if
+    there is no such sample, or if the motion has lost count of the turns of a torsion spring."""
+    k = _sample(motion, t)
+    start = assembled(scene)
+    model = Model(start)
+    q = model.start().reshape(-1, 7).copy()
+    for b, body in enumerate(scene.body):
+        place = motion.bodies.index(body.name)
+        q[b, :3] = motion.position[k, place]
+        q[b, 3:] = rotations.multiply(motion.orientation[k, place], model.principal[b])
+    model.release()
+    angles, turned = angles_at_start(scene), {}
+    for number, load in enumerate(scene.load):
+        if isinstance(load, TorsionSpring):
+            angle = joint_motion(scene, motion, load.joint).angle
+            assert angle is not None  # such springs act on joints that turn
+            turned[number] = float(angle[k]) - angles[load.joint]
+            if np.isnan(turned[number]):
+                raise InputError(f"scene_at: the motion has lost count of the turns of joint {load.joint!r}")
+    placed, at = placed_with_springs(model, q.ravel(), turned), float(motion.times[k])
+    bodies = [
+        body.model_copy(update={"velocity": tuple(v.tolist()), "angular_velocity": tuple(w.tolist())})
+        for body, v, w in zip(
+            placed.body,
+            *(
+                each[k, [motion.bodies.index(b.name) for b in scene.body]]
+                for each in (motion.velocity, motion.angular_velocity)
+            ),
+            strict=True,
+        )
+    ]
+    return placed.with_(
+        body=bodies,
+        driver=[driver.from_time(at) for driver in scene.driver],
+        load=[later for load in placed.load if (later := _from_time(load, at)) is not None],
+        duration=scene.duration - at if scene.duration > at else scene.duration,
+    )
+
+
+def _from_time(load: Load, t: float) -> Load | None:
+    """Return the load with a factor of the time since t (s); None if it is switched off from then on."""
+    if load.over_time is None:
+        return load
+    factor = load.over_time.from_time(t)
+    return None if factor is None else load.model_copy(update={"factor": factor})
+
+
+def _sample(motion: Trajectory, t: float) -> int:
+    """Return the index of the sample at t (s); raises InputError that names the nearest one."""
+    if not motion.times.size:
+        raise InputError("scene_at: the motion has no sample")
+    k = int(np.abs(motion.times - t).argmin())
+    if not abs(motion.times[k] - t) <= SAME_TIME * max(1e-300, float(motion.times[-1])):
+        raise InputError(f"scene_at: no sample at {t:g} s; the nearest one is at {motion.times[k]:.9g} s")
+    return k

@@ -1,0 +1,88 @@
+"""Motions and entries as objects of Python: bodies by name, scenes at samples, errors without pages."""
+
+import numpy as np
+import pytest
+
+import crosscheck
+import mbref
+from mbref.scene import Body, Revolute
+from tests.helpers.powered_mechanisms import powered_mechanism
+from tests.helpers.short_motions import MOTIONS
+
+GATE = (
+    "pendulum with torsion spring",
+    "driven angle by a table",
+    "planet with armatures",
+    "driven gears",
+    "pendulum with force over time",
+    "arm with distance",
+    "screw with armature",
+)
+MAKERS = {**MOTIONS, **{f"powered {seed}": lambda seed=seed: powered_mechanism(seed) for seed in range(12)}}
+CLOSE = 1e-8  # m, rad/s; two runs at rtol 1e-12, of which one starts with rounded poses
+
+
+@pytest.fixture(scope="module")
+def crank():
+    return mbref.simulate("planar_slider_crank", times=[0.0, 0.05])
+
+
+@pytest.mark.parametrize(
+    "name", [n if n in GATE else pytest.param(n, marks=pytest.mark.slow) for n in MAKERS]
+)
+def test_scene_at_a_sample_continues_the_motion(name):
+    """From 0.4 to 1 of the duration, with all drivers, loads over time, springs, couplings and offsets."""
+    scene = MAKERS[name]()
+    times = scene.duration * np.array([0.4, 1.0])
+    whole = mbref.simulate(scene, times=times, rtol=1e-12)
+    rest = mbref.simulate(whole.scene_at(times[0]), times=[times[1] - times[0]], rtol=1e-12)
+    assert np.abs(rest.position[0] - whole.position[1]).max() < CLOSE
+    assert np.abs(rest.angular_velocity[0] - whole.angular_velocity[1]).max() < CLOSE
+
+
+def test_scene_at_a_time_without_sample_is_refused_with_the_nearest_one(crank):
+    with pytest.raises(mbref.InputError, match=r"no sample at 0\.03 s; the nearest one is at 0\.05 s"):
+        crank.scene_at(0.03)
+
+
+def test_motion_is_a_dictionary_of_its_bodies_and_equal_to_itself_only(crank):
+    assert list(crank) == ["crank", "rod", "slider"] and len(crank) == 3
+    assert "rod" in crank and "lid" not in crank and 0 not in crank
+    assert crank._ipython_key_completions_() == list(crank)
+    again = mbref.Motion.of(crank.mechanism, crank)
+    assert crank in (crank,) and crank != again and len({crank, again, crank}) == 2
+    assert crank["rod"] != crank["rod"] and len({crank.joint("A"), crank["rod"]}) == 2
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: Body(name="b", position=(0, 0)), "position: must be three numbers"),
+        (
+            lambda: Body(name="b", position=(0, 0, 0), mass="3 N"),
+            "mass: must be a number, or one with a unit",
+        ),
+        (lambda: Revolute(name="A", bodies=("a", "b"), anchor=(0, 0, 0), axi=(0, 0, 1)), "mean 'axis'"),
+        (mbref.Scene, "body: is required"),
+    ],
+)
+def test_faulty_entry_made_in_python_has_sentences_and_no_page(make, says):
+    with pytest.raises(mbref.SceneError, match=says) as caught:
+        make()
+    assert "pydantic" not in str(caught.value) and "http" not in str(caught.value)
+
+
+def test_entry_cannot_be_changed_and_its_error_names_the_remedy():
+    scene = mbref.find_scene("four_bar")
+    with pytest.raises(AttributeError, match=r"scene\.with_\(\.\.\.\) returns a changed copy"):
+        scene.duration = 3.0
+    with pytest.raises(AttributeError, match=r"Body\.mass cannot be set"):
+        scene.body[0].mass = 3.0
+    assert scene == mbref.find_scene("four_bar")
+
+
+@pytest.mark.parametrize("package", [mbref, crosscheck])
+def test_dir_of_a_package_has_its_public_names_alone(package):
+    """Each of them exists."""
+    assert set(dir(package)) - {"__version__"} == set(package.__all__)
+    assert all(getattr(package, name) is not None for name in dir(package))
