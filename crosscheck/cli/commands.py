@@ -150,6 +150,12 @@ def _diff(arguments: argparse.Namespace) -> int:
     return OTHERWISE if show(console(), arguments.old, arguments.new, arguments.all) else COMPLETED
 
 
+def _files(arguments: argparse.Namespace) -> int:
+    from crosscheck.cli.files import files
+
+    return files(arguments)
+
+
 def _versions(arguments: argparse.Namespace) -> int:
     from crosscheck.cli.versions import versions
 
@@ -163,6 +169,7 @@ COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "tune": tune,
     "verify": _verify,
     "findings": _findings,
+    "files": _files,
     "diagnose": _diagnose,
     "closed-loops": closed_loops,
     "convergence": convergence,

@@ -1,10 +1,14 @@
-"""Parsers of the commands for defects and versions of engines: findings, diagnose, diff and versions."""
+"""Parsers of the commands for defects and versions of engines: findings, files, diagnose, diff, versions."""
 
 from __future__ import annotations
 
 from crosscheck.cli.commands_of_motions import Commands, add_command
 from crosscheck.cli.options import MOST_MECHANISMS, add_duration, add_engines, add_limits, add_reading
-from mbref.command_line import whole
+from crosscheck.engines.loaders import PLACES
+from crosscheck.study.grid import MOST_SECONDS
+from mbref.command_line import add_output, number, whole
+
+READER_LIMIT = 120.0  # s of CPU time of a reader of files, imports and compilation included
 
 
 def add_findings(commands: Commands) -> None:
@@ -15,6 +19,41 @@ def add_findings(commands: Commands) -> None:
     parser.add_argument(
         "--recheck", action="store_true", help="run the proofs, and report which findings are still present"
     )
+
+
+def add_files(commands: Commands) -> None:
+    """Add the parser of `crosscheck files`."""
+    about = (
+        "read one MJCF, URDF or SDF file by the own reader of each engine, and show which machine each one "
+        "built, against the specification of the format: bodies, joints, loops, couplings, gravity, and the "
+        "engine's own mass matrix and gravity torques at four poses. Each reader runs in a process of its "
+        "own. Exit status: 0 if all readers build the file's machine, 1 if one does not, 2 for a faulty file"
+    )
+    example = (
+        "crosscheck files robot.urdf\n  crosscheck files robot.xml --engine drake --engine newton --install"
+    )
+    parser = add_command(commands, "files", about, example)
+    about = "an MJCF, URDF or SDF file; without it: the stored table of features and readers"
+    parser.add_argument("robot", nargs="?", metavar="ROBOT", help=about)
+    about = (
+        f"a reader, or E==VERSION; may repeat: {', '.join(PLACES)}, or module:attribute; "
+        "default: all that are installed"
+    )
+    parser.add_argument("--engine", action="append", metavar="E", help=about)
+    about = (
+        "install missing packages with pip, each into an environment of its own in the cache folder, as "
+        "`crosscheck versions` does"
+    )
+    parser.add_argument("--install", action="store_true", help=about)
+    parser.add_argument("--run", action="store_true", help="measure the stored table again, or readers of it")
+    add_output(parser, "--page", metavar="FILE", help="also write the table as a page in Markdown")
+    about = "do not try changes of the file that let more readers build its machine"
+    parser.add_argument("--no-advice", action="store_true", help=about)
+    about = "CPU time of a reader; default: %(default)g"
+    parser.add_argument(
+        "--time-limit", type=number(MOST_SECONDS, "s"), default=READER_LIMIT, metavar="S", help=about
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON document and nothing else")
 
 
 def add_diagnose(commands: Commands) -> None:

@@ -5,7 +5,13 @@ from __future__ import annotations
 import argparse
 from textwrap import fill
 
-from crosscheck.cli.commands_of_engines import add_diagnose, add_diff, add_findings, add_versions
+from crosscheck.cli.commands_of_engines import (
+    add_diagnose,
+    add_diff,
+    add_files,
+    add_findings,
+    add_versions,
+)
 from crosscheck.cli.commands_of_motions import Commands, add_certify, add_command, add_judge, add_reference
 from crosscheck.cli.listing import TABLES
 from crosscheck.cli.options import (
@@ -43,8 +49,8 @@ EXIT = (
     "`run` gives 1 where a run did not complete; `compare` and `report` give 0 although engines fail, since "
     "failures of engines are results, and `compare` 1 where two engines simulate different "
     "mechanisms. `tune` gives 1 where no setting reaches the error, `verify` where a check fails "
-    "or no scene was run, `diagnose` where a known defect shows, `diff` and `versions` where something "
-    "differs by more than noise."
+    "or no scene was run, `diagnose` where a known defect shows, `files` where a reader builds another "
+    "machine, `diff` and `versions` where something differs by more than noise."
 )
 
 
@@ -66,6 +72,7 @@ def parser() -> argparse.ArgumentParser:
         _add_tune,
         _add_verify,
         add_findings,
+        add_files,
         add_diagnose,
         _add_closed_loops,
         _add_convergence,

@@ -60,15 +60,18 @@ class Observation(NamedTuple):
 
 
 class Child:
-    """A child process; its owner must call ``close``."""
+    """A child process; its owner must call ``close``.
 
-    def __init__(self) -> None:
+    It runs the interpreter ``python`` of another environment that has crosscheck on its path, or this one.
+    """
+
+    def __init__(self, python: Path | None = None) -> None:
         self.ready: Observation | None = None  # result of preparing the engine, for copies of the process
         self._copies = False  # True if a copy of the process makes the present call
         self._printed = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - closed by `close`
         self._channel, theirs = Pipe()
         with theirs:
-            self._process = _started(theirs.fileno(), self._printed.fileno())
+            self._process = _started(theirs.fileno(), self._printed.fileno(), python)
         _alive.add(self)
 
     @property
@@ -205,14 +208,16 @@ def stop_all() -> None:
         child.kill()
 
 
-def _started(channel: int, printed: int) -> Forked | subprocess.Popen[bytes]:
+def _started(channel: int, printed: int, python: Path | None) -> Forked | subprocess.Popen[bytes]:
     """Return a new process that reads its calls from a file descriptor and prints to another."""
     environment = _environment()
-    if fork_server.AVAILABLE:
+    if python is not None:
+        del environment["PYTHONPATH"]  # the packages of this environment follow its own, by its path file
+    elif fork_server.AVAILABLE:
         with contextlib.suppress(EOFError, OSError):  # the server has ended
             return fork_server.forked(channel, printed, environment)
     return subprocess.Popen(
-        [sys.executable, "-P", "-m", "crosscheck.processes.serve"],
+        [python or sys.executable, "-P", "-m", "crosscheck.processes.serve"],
         stdin=channel,
         stdout=printed,
         stderr=subprocess.STDOUT,

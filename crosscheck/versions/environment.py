@@ -56,9 +56,7 @@ def environment(wanted: Requirement) -> Path:
 
     Raises NotInstalled.
     """
-    pins = _pins()
-    origin = hashed(sys.prefix, sys.version, str(PRODUCT), *pins)
-    place = cache("versions") / f"{wanted.package}-{wanted.version}-{origin[:8]}"
+    place, pins = _place(wanted), _pins()
     if not place.exists():
         place.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=place.parent, prefix="making-") as made:
@@ -66,6 +64,17 @@ def environment(wanted: Requirement) -> Path:
             if not place.exists():  # another process may have made it meanwhile
                 (Path(made) / "venv").rename(place)
     return _python(place)
+
+
+def existing(wanted: Requirement) -> Path | None:
+    """Return the Python interpreter of the environment of a version; None if it was not made before."""
+    place = _place(wanted)
+    return _python(place) if place.exists() else None
+
+
+def _place(wanted: Requirement) -> Path:
+    origin = hashed(sys.prefix, sys.version, str(PRODUCT), *_pins())
+    return cache("versions") / f"{wanted.package}-{wanted.version}-{origin[:8]}"
 
 
 def _python(place: Path) -> Path:

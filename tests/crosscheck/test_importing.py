@@ -160,27 +160,6 @@ def test_bodies_of_a_weld_are_assembled_at_its_relative_pose(tmp_path):
     assert difference(held) < SAME
 
 
-def test_links_fixed_together_are_one_body_with_their_mass_and_moment(tmp_path):
-    """0.5 kg at 0.3 m and 0.1 kg at 0.5 m from the hinge; the moment about y by Steiner's theorem."""
-    text = """<robot name="r"><link name="base"/><link name="frame"/>
-    <link name="arm"><inertial><origin xyz="0.2 0 0"/><mass value="0.5"/>
-    <inertia ixx="0.0002" iyy="0.004" izz="0.004" ixy="0" ixz="0" iyz="0"/></inertial></link>
-    <link name="lamp"><inertial><mass value="0.1"/>
-    <inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial></link>
-    <link name="mark"/>
-    <joint name="j" type="continuous"><parent link="base"/><child link="frame"/><axis xyz="0 1 0"/></joint>
-    <joint name="k" type="fixed"><parent link="frame"/><child link="arm"/><origin xyz="0.1 0 0"/></joint>
-    <joint name="m" type="fixed"><parent link="arm"/><child link="lamp"/><origin xyz="0.4 0 0"/></joint>
-    <joint name="n" type="fixed"><parent link="lamp"/><child link="mark"/></joint></robot>"""
-    found = read(tmp_path, text, "lamp.urdf")
-    (body,) = found.imported.scene.body
-    assert body.name == "arm" and body.mass == pytest.approx(0.6)
-    assert body.position == pytest.approx(((0.5 * 0.3 + 0.1 * 0.5) / 0.6, 0.0, 0.0))
-    about = 0.004 + 0.5 * 0.3**2 + 0.1 * 0.5**2 - 0.6 * body.position[0] ** 2
-    assert body.inertia[1] == pytest.approx(about)
-    assert difference(found) < SAME
-
-
 def middle(first: str, second: str, apart: str = "0 0 0", more: str = "") -> str:
     """A URDF: hinge, link ``mid`` without mass, hinge ``apart`` from the first, link ``l`` of 0.4 kg."""
     return f"""<robot name="r"><link name="base"/><link name="mid"/>{more}
@@ -316,11 +295,6 @@ def test_a_mimic_joint_is_a_coupling_whose_offset_the_pose_meets(tmp_path):
     assert second == pytest.approx(0.3 - 1.5 * first, abs=1e-12)
 
 
-def test_a_mimic_of_an_unknown_joint_is_refused_by_its_name(tmp_path):
-    with pytest.raises(SceneError, match="joint 'j2' mimics 'j9': the file has no such joint"):
-        read(tmp_path, follower('<mimic joint="j9"/>'), "mimic.urdf")
-
-
 # two wheels on parallel hinges, coupled by q₂ = POLY(q₁); the first has an armature of 0.02 kg m²
 GEARS = """<mujoco><option gravity="0 0 -9.81"/><worldbody>
 <body name="w1" pos="0 0 1"><joint name="g1" axis="0 1 0" armature="0.02"/>
@@ -339,27 +313,6 @@ def test_a_linear_equality_of_joints_is_a_coupling_that_the_motion_keeps(tmp_pat
     fallen = mbref.simulate(found.imported.scene, times=[0.0, 0.2], method="alf-dual+projection/dop853")
     turned = [fallen.joint(name).angle[-1] for name in ("g1", "g2")]
     assert turned[1] == pytest.approx(-2 * turned[0], rel=1e-9) and turned[0] > 0.01
-
-
-def test_a_quadratic_coupling_is_refused_unless_it_is_left_out(tmp_path):
-    """q₂ = -2 q₁ + 0.1 q₁²."""
-    text = GEARS.replace("POLY", "0 -2 0.1 0 0")
-    with pytest.raises(SceneError, match=r"equality 'gears' of type joint, whose polynomial is not linear.*"):
-        read(tmp_path, text)
-    assert not read(tmp_path, text, without=["couplings"]).imported.scene.coupling
-
-
-def test_armature_of_a_hinge_adds_to_the_moment_of_inertia_about_it(tmp_path):
-    """(I + m l² + armature) θ'' = m g l; MuJoCo's mass matrix has the armature too."""
-    rotor = 'armature="0.005"'
-    inertial = '<inertial pos="0.05 0 0" mass="0.01" diaginertia="2e-6 2e-6 2e-6"/>'
-    body = f'<body name="f">{hinge("j", more=rotor)}{inertial}</body>'
-    text = f"<mujoco><worldbody>{body}</worldbody></mujoco>"
-    found = read(tmp_path, text)
-    assert difference(found) < SAME
-    turning = np.linalg.norm(gauss(found.imported.scene)[0]) / 0.05
-    assert turning == pytest.approx(0.01 * 9.81 * 0.05 / (2e-6 + 0.01 * 0.05**2 + 0.005), rel=1e-12)
-    assert found.imported.scene.joint[0].armature == 0.005
 
 
 def test_bodies_begin_with_the_velocities_of_the_keyframe(tmp_path):

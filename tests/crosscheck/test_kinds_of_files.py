@@ -3,11 +3,15 @@
 import re
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 
+from crosscheck.engines.loaders.loader import DOUBLE, built
+from crosscheck.engines.loaders.pinocchio import Pinocchio
 from crosscheck.engines.mujoco.importing.reading import Source, source
+from crosscheck.files.differences import of_reading, of_statics
+from crosscheck.files.matching import matched
+from crosscheck.files.reading import file_of
 from mbref.formats import ImportOptions
 from mbref.scene import SceneError
 from tests.crosscheck.originals import apart
@@ -61,12 +65,6 @@ REFUSED = {
     "xacro_macro.urdf": "element <xacro:macro>: is a macro of xacro; write the URDF with",
     "xacro_property.urdf": r"<mass value='\$\{m\}'>: is an expression of xacro",
 }
-FREE_IN_PINOCCHIO = (
-    "floating_on_odom.urdf",
-    "floating_root.urdf",
-    "hold_floating.urdf",
-    "planar_root.urdf",
-)  # coordinates differ
 ROWS_OF_OUR_OWN = ("close", "mimic")  # MuJoCo reads none from a URDF; see test_robot_files.py
 SLOW = (  # 1 to 16 s
     "excavator_with_springs.xml",
@@ -111,27 +109,18 @@ def test_file_with_an_unsupported_element_is_refused_with_the_element_s_name(nam
     assert re.search(REFUSED[name], " ".join(str(refusal.value).split()))
 
 
-@pytest.mark.parametrize("name", [n for n in READ if n.endswith(".urdf") and n not in FREE_IN_PINOCCHIO])
-def test_urdf_has_the_mass_matrix_and_weight_of_pinocchio_s_reading(name):
-    """At random joint coordinates, M and g of the model that the scene is made from are Pinocchio's."""
-    pinocchio = pytest.importorskip("pinocchio")
-    model, ours = pinocchio.buildModelFromXML((KINDS / name).read_text()), found(name).original
-    data, random = mujoco.MjData(ours), np.random.default_rng(0)
-    joints = [model.getJointId(ours.joint(j).name) for j in range(ours.njnt)]
-    order, q = [model.idx_vs[j] for j in joints], pinocchio.neutral(model)
-    assert sorted(order) == list(range(model.nv))
-    for k, j in enumerate(joints):
-        value, at = random.uniform(-1, 1), model.idx_qs[j]
-        data.qpos[k] = value
-        q[at : at + model.nqs[j]] = (np.cos(value), np.sin(value)) if model.nqs[j] == 2 else value
-    theirs = pinocchio.crba(model, model.createData(), q)
-    theirs = (np.triu(theirs) + np.triu(theirs, 1).T)[np.ix_(order, order)]
-    weight = pinocchio.computeGeneralizedGravity(model, model.createData(), q)[order]
-    mass = np.zeros((ours.nv, ours.nv))
-    mujoco.mj_forward(ours, data)
-    mujoco.mj_fullM(ours, data, mass)
-    assert np.abs(mass - theirs).max() < SAME * np.abs(mass).max()
-    assert np.abs(data.qfrc_bias - weight).max() < SAME * np.abs(weight).max()
+@pytest.mark.parametrize("name", [n for n in READ if n.endswith(".urdf") and "mimic" not in n])
+def test_pinocchio_builds_the_machine_of_the_urdf(name):
+    """Bodies, joints and couplings, and the mass matrix and weight at four poses, are those of the file."""
+    pytest.importorskip("pinocchio")
+    file = file_of(KINDS / name)
+    found = built(Pinocchio(), file.path, file.form, file.poses, file.gravity)
+    match = matched(file.machine, found.machine, DOUBLE)
+    differences = [
+        *of_reading(match, DOUBLE),
+        *of_statics(match, found.statics, file.poses, file.gravity, DOUBLE),
+    ]
+    assert differences == [] and not found.fault
 
 
 def test_included_and_attached_bodies_are_imported_with_their_prefix(tmp_path):

@@ -172,40 +172,6 @@ DYNAMICS = (
 )
 
 
-def test_dynamics_of_hinges_and_slides_become_springs(tmp_path):
-    """Stiffness, damping and natural angle or displacement are the file's (2, 0.1, 0.3)."""
-    (spring,) = read(tmp_path, pair(more=DYNAMICS)).scene.load
-    assert (spring.joint, spring.stiffness, spring.damping, spring.natural_angle) == ("B", 2.0, 0.1, 0.3)
-    (slide,) = read(tmp_path, pair("prismatic", DYNAMICS)).scene.load
-    assert (slide.type, slide.stiffness, slide.natural_displacement) == ("slide_spring", 2.0, 0.3)
-
-
-def test_mimic_joint_becomes_a_coupling_with_its_multiplier(tmp_path):
-    """Joint B mimics A with multiplier -2: q_B = -2 q_A."""
-    mimic = '<mimic joint="A"><multiplier>-2</multiplier><offset>0</offset><reference>0</reference></mimic>'
-    (coupling,) = read(tmp_path, pair(more=mimic)).scene.coupling
-    assert (coupling.joints, coupling.ratio) == (("A", "B"), -2.0)
-
-
-def test_screw_becomes_a_cylinder_with_a_coupled_displacement(tmp_path):
-    """A pitch of 0.02 m a turn is 0.02 / 2π m/rad."""
-    thread = 'type="screw"><screw_thread_pitch>0.02</screw_thread_pitch>'
-    scene = read(tmp_path, pair("screw").replace('type="screw">', thread)).scene
-    assert scene.joint[1].type == "cylindrical"
-    assert scene.coupling[0].ratio == pytest.approx(0.02 / (2 * np.pi))
-
-
-def test_links_of_several_models_have_the_model_s_name_in_front(tmp_path):
-    """Link a of model m is body "m::a". A second, static model is left out."""
-    text = pair(link='<link name="lamp"/>').replace(
-        "</model></sdf>",
-        '</model><model name="floor"><static>true</static><link name="plate"/></model></sdf>',
-    )
-    found = read(tmp_path, text)
-    assert [body.name for body in found.scene.body] == ["m::a", "m::lamp", "m::b"]
-    assert found.scene.joint[0].bodies == (GROUND, "m::a")
-
-
 @pytest.mark.parametrize(
     ("text", "says"),
     [
@@ -271,33 +237,10 @@ def test_faulty_sdf_is_refused_with_the_element_s_name(text, says, tmp_path):
         read(tmp_path, text)
 
 
-def test_limits_and_friction_that_are_left_out_are_listed(tmp_path):
-    """A limit of a joint never acts in a scene; dry friction is left out by ``--without friction``."""
-    more = "<limit><lower>-1</lower></limit><dynamics><friction>1</friction></dynamics>"
-    found = read(tmp_path, pair(more=more), without=["friction"])
-    assert any("1 limit of a joint" in part for part in found.left_out)
-    assert any("--without friction" in part for part in found.left_out)
-
-
 def test_keyframe_of_an_sdf_file_is_refused(tmp_path):
     """SDF has no keyframes: option ``--keyframe`` is an error that says where poses are."""
     with pytest.raises(SceneError, match="an SDF file gives the poses"):
         read(tmp_path, pair(), keyframe="home")
-
-
-def test_nested_model_has_full_names_and_its_own_frame(tmp_path):
-    """The nested model is 0.3 m off along x and turned by half a turn about z; a ball joins both models."""
-    inner = LINK.format(name="a", pose="0 0 1 0 0 0", centre="0.1 0 0")
-    inner += '<frame name="tip" attached_to="a"><pose>0.2 0 0 0 0 0</pose></frame>'
-    hinge = HINGE.format(name="A", kind="revolute", parent="world", child="a", more="")
-    nested = f'<model name="n"><pose>0.3 0 0 0 0 3.141592653589793</pose>{inner}{hinge}</model>'
-    joint = HINGE.format(name="C", kind="ball", parent="a", child="n::tip", more="")
-    found = read(tmp_path, pair(joint=nested + joint)).scene
-    assert [body.name for body in found.body] == ["a", "b", "n::a"]
-    assert np.allclose(found.body[2].position, (0.2, 0, 1))
-    hinge, ball = found.joint_named("n::A"), found.joint_named("C")
-    assert hinge.bodies == (GROUND, "n::a") and np.allclose(hinge.axis, (0, -1, 0))
-    assert ball.bodies == ("a", "n::a") and np.allclose(ball.anchor, (0.1, 0, 1))
 
 
 def test_joint_of_the_world_connects_two_models_in_a_world_frame(tmp_path):
@@ -313,13 +256,6 @@ def test_joint_of_the_world_connects_two_models_in_a_world_frame(tmp_path):
     scene = read(tmp_path, text).scene
     assert scene.joint[0].bodies == ("p::a", "q::a") and np.allclose(scene.joint[0].anchor, (2, 5, 1))
     assert np.allclose(scene.body[0].position, (1.1, 5, 1))
-
-
-@pytest.mark.parametrize(("version", "axis"), [("1.4", (0, 1, 0)), ("1.5", (0, 0, 1))])
-def test_axes_before_version_1_5_are_given_in_the_model_s_frame(version, axis, tmp_path):
-    """The link is turned by a quarter turn about x; its hinge is along y of the model, or of the link."""
-    text = pair().replace("1.7", version).replace("<pose>0 0 1 0 0 0<", "<pose>0 0 1 1.5707963267948966 0 0<")
-    assert np.allclose(read(tmp_path, text).scene.joint_named("A").axis, axis)
 
 
 def test_link_named_ground_is_renamed(tmp_path):

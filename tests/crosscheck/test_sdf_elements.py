@@ -1,6 +1,5 @@
 """SDF files of one link and joint / bodies, joints and sentences worked out by hand."""
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -69,18 +68,6 @@ def test_link_element_that_changes_the_motion_is_refused_or_left_out(
 
 
 # --- Joints -----------------------------------------------------------------------------------------------
-def test_axis_is_normalised_in_the_frame_that_it_names(tmp_path: Path) -> None:
-    """The link is turned by a quarter turn about x, so that its z axis is the world's -y. The axis is (0, 0,
-    4) of the link or of the model; without numbers it is z of the link, SDF's default."""
-    turned = LINK.replace("1 2 3 0 0 0", f"1 2 3 {math.pi / 2!r} 0 0")
-    long = hinge().replace("<xyz>0 0 1", "<xyz>0 0 4")
-    of_model = long.replace("<xyz>", '<xyz expressed_in="__model__">')
-    default = hinge(axes="").replace("</joint>", "<axis/></joint>")
-    for joint, axis in ((long, (0, -1, 0)), (of_model, (0, 0, 1)), (default, (0, -1, 0))):
-        found = read(tmp_path, turned + joint).scene.joint[0].directions[0]
-        assert found == pytest.approx(axis, abs=1e-15)
-
-
 DYNAMICS = (
     "<dynamics><damping>0.5</damping><friction>0</friction><spring_reference>0.25</spring_reference>"
     "<spring_stiffness>3</spring_stiffness></dynamics>"
@@ -101,13 +88,6 @@ def test_damping_and_spring_of_a_ball_joint_are_refused_by_name(tmp_path: Path) 
         read(tmp_path, LINK + hinge(DYNAMICS, "ball"))
     causes = [fault.partition(":")[0] for fault in refused.value.faults]
     assert causes == ["damping of joint 'j'", "springs of joint 'j'"]
-
-
-def test_damping_of_a_ball_joint_is_left_out_on_request(tmp_path: Path) -> None:
-    """The option is ``--without damping``; the joint has no stiffness."""
-    damped = DYNAMICS.replace(">3<", ">0<")
-    found = read(tmp_path, LINK + hinge(damped, "ball"), without=["damping"])
-    assert found.left_out == ("damping of joint 'j' (--without damping)",)
 
 
 def test_export_of_sdf_is_refused_with_a_format_that_works(tmp_path: Path) -> None:

@@ -48,6 +48,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["small_motions"],
         ["paper"],
         ["versions"],
+        ["files"],
         ["cli"],
         ["__main__"],
     ),

@@ -1,0 +1,152 @@
+"""DART's readers of URDF, SDF and MJCF."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.loaders.loader import MJCF, SDF, URDF, Loaded, Loader
+from crosscheck.engines.loaders.machine import (
+    FIXED,
+    REVOLUTE,
+    SCALAR,
+    TRANSLATIONAL,
+    WORLD,
+    Body,
+    Coupling,
+    Joint,
+    Machine,
+    Statics,
+    Vector,
+    coefficients,
+    limits,
+    matrix,
+    vector,
+)
+from crosscheck.engines.loaders.placing import Place
+
+TYPES = {
+    "WeldJoint": FIXED,
+    "RevoluteJoint": REVOLUTE,
+    "PrismaticJoint": TRANSLATIONAL,
+    "FreeJoint": "free",
+    "BallJoint": "spherical",
+    "UniversalJoint": "universal",
+    "PlanarJoint": "planar",
+    "ScrewJoint": "screw",
+}
+
+
+class Dart(Loader):
+    """DART's readers with default options, except that the root link of a URDF is fixed."""
+
+    name = "dart"
+    package = "dartpy"
+    version = "6.20.0"
+    formats = (URDF, SDF, MJCF)
+    convention = "a URDF's root link is fixed to the world by RootJointType.FIXED"
+
+    def load(self, path: Path, form: str) -> Loaded:
+        """Read the skeletons of the file; raises ValueError if DART returns none."""
+        import dartpy
+
+        if form == URDF:
+            options = dartpy.utils.DartLoader.Options()
+            options.mDefaultRootJointType = dartpy.utils.DartLoader.RootJointType.FIXED
+            reader = dartpy.utils.DartLoader()
+            reader.setOptions(options)
+            skeleton = reader.parseSkeleton(str(path))
+            skeletons, gravity = [skeleton] if skeleton else [], None
+        else:
+            world = {SDF: dartpy.utils.SdfParser, MJCF: dartpy.utils.MjcfParser}[form].readWorld(str(path))
+            number = world.getNumSkeletons() if world else 0
+            skeletons = [world.getSkeleton(k) for k in range(number)]
+            gravity = vector(world.getGravity()) if world else None
+        if not skeletons:
+            raise ValueError("DART returns no skeleton")
+        return Skeletons(dartpy, skeletons, gravity)
+
+
+class Skeletons(Loaded):
+    """Skeletons at their initial positions."""
+
+    def __init__(self, dart: Any, skeletons: list[Any], gravity: Vector | None):
+        self.dart, self.skeletons, self.gravity = dart, skeletons, gravity
+        self.joints = [s.getJoint(k) for s in skeletons for k in range(s.getNumJoints())]
+        self.nodes = [s.getBodyNode(k) for s in skeletons for k in range(s.getNumBodyNodes())]
+
+    def machine(self) -> Machine:
+        return Machine(
+            bodies=tuple(map(self._body, self.nodes)),
+            joints=tuple(map(self._joint, self.joints)),
+            couplings=tuple(self._couplings()),
+            gravity=self.gravity,
+        )
+
+    def _at(self, node: Any) -> Place:
+        frame = node.getWorldTransform()
+        return Place(np.array(frame.translation()), np.array(frame.rotation()))
+
+    def _body(self, node: Any) -> Body:
+        inertia = node.getInertia()
+        moments = inertia.getMoment()
+        return self._at(node).body(node.getName(), inertia.getMass(), inertia.getLocalCOM(), moments)
+
+    def _joint(self, joint: Any) -> Joint:
+        node, parent = joint.getChildBodyNode(), joint.getParentBodyNode()
+        frame = joint.getTransformFromChildBodyNode()
+        at = self._at(node).then(Place(np.array(frame.translation()), np.array(frame.rotation())))
+        kind = TYPES.get(joint.getType(), joint.getType())
+        pair = parent.getName() if parent else WORLD, node.getName()
+        name, anchor = joint.getName(), vector(at.position)
+        if kind == "planar":
+            return Joint(name, kind, pair, anchor, at.direction(joint.getRotationalAxis()))
+        if kind == "screw":
+            axis = at.direction(joint.getAxis())
+            return Joint(name, kind, pair, anchor, axis, pitch=float(joint.getPitch()))
+        if kind not in SCALAR:
+            return Joint(name, kind, pair, anchor)
+        stiffness = coefficients(0.0, joint.getSpringStiffness(0))[1:]
+        return Joint(
+            name,
+            kind,
+            pair,
+            anchor,
+            at.direction(joint.getAxis()),
+            damping=coefficients(joint.getDampingCoefficient(0)),
+            stiffness=stiffness,
+            rest=float(joint.getRestPosition(0)) if stiffness else None,
+            armature=0.0,
+            friction=float(joint.getCoulombFriction(0)),
+            reference=float(joint.getPosition(0)),
+            **limits(joint.getPositionLowerLimit(0), joint.getPositionUpperLimit(0)),
+        )
+
+    def _couplings(self) -> Iterator[Coupling]:
+        mimic = self.dart.dynamics.ActuatorType.MIMIC
+        for joint in self.joints:
+            if joint.getNumDofs() == 1 and joint.getActuatorType() == mimic:
+                yield Coupling(joint.getName(), joint.getName(), "", ())  # Python has no access to the law
+
+    def statics(self, pose: Mapping[str, float], gravity: Vector) -> Statics:
+        for joint in self.joints:
+            if joint.getNumDofs() == 1:
+                joint.setPosition(0, joint.getInitialPosition(0) + pose.get(joint.getName(), 0.0))
+        names, places, size = list[str](), list[int](), sum(s.getNumDofs() for s in self.skeletons)
+        mass, torque, start = np.zeros((size, size)), np.zeros(size), 0
+        for skeleton in self.skeletons:
+            skeleton.setGravity(np.array(gravity))
+            skeleton.setVelocities(np.zeros(skeleton.getNumDofs()))
+            end = start + skeleton.getNumDofs()
+            mass[start:end, start:end] = skeleton.getMassMatrix()
+            torque[start:end] = skeleton.getGravityForces()
+            for joint in (skeleton.getJoint(k) for k in range(skeleton.getNumJoints())):
+                if TYPES.get(joint.getType()) in SCALAR:
+                    names.append(joint.getName())
+                    places.append(start + joint.getIndexInSkeleton(0))
+            start = end
+        centres = {node.getName(): vector(node.getCOM()) for node in self.nodes}
+        return Statics(tuple(names), matrix(mass[np.ix_(places, places)]), vector(torque[places]), centres)

@@ -1,0 +1,124 @@
+"""The machine that a file describes or an engine built, in one neutral form.
+
+All vectors are in world axes at the reference pose, in which every joint coordinate has its reference value.
+Units are SI and rad. None stands for a quantity that the format does not state or the library does not have.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+WORLD = "world"
+FIXED, REVOLUTE, TRANSLATIONAL = "fixed", "revolute", "translational"
+SCALAR = (REVOLUTE, TRANSLATIONAL)  # joints with one coordinate that turns or slides
+Vector = tuple[float, ...]
+Matrix = tuple[Vector, ...]
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body: mass, centre of mass (3,), inertia (3, 3) about the centre of mass."""
+
+    name: str
+    mass: float | None = None
+    centre: Vector | None = None
+    inertia: Matrix | None = None
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint of the tree, which lets the second of two bodies move relative to the first.
+
+    ``axis`` (3,) is the motion per unit of the coordinate: the rotation vector (rad) or the displacement (m).
+    A planar joint has its normal, a joint without one axis None. ``damping`` and ``stiffness`` are
+    coefficients of rising powers of the rate and of the displacement from ``rest``. ``reference`` is the
+    coordinate's value at the reference pose.
+    """
+
+    name: str
+    type: str
+    bodies: tuple[str, str]
+    anchor: Vector | None = None
+    axis: Vector | None = None
+    lower: float | None = None
+    upper: float | None = None
+    damping: Vector | None = None
+    stiffness: Vector | None = None
+    rest: float | None = None
+    armature: float | None = None
+    friction: float | None = None
+    reference: float | None = None
+    pitch: float | None = None  # displacement of a screw per turn, m
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A constraint between two bodies of the tree; its anchor on each of them is at the reference pose."""
+
+    name: str
+    type: str
+    bodies: tuple[str, str]
+    anchors: tuple[Vector, Vector] | None = None
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A follower whose displacement from the reference is Σ coefficients[k] · (the leader's)^k."""
+
+    name: str
+    follower: str
+    leader: str
+    coefficients: Vector
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Bodies without the world, joints of the tree, loops, couplings and gravity (3,), with messages."""
+
+    bodies: tuple[Body, ...] = ()
+    joints: tuple[Joint, ...] = ()
+    loops: tuple[Loop, ...] | None = ()
+    couplings: tuple[Coupling, ...] | None = ()
+    gravity: Vector | None = None
+    messages: tuple[str, ...] = field(default=(), compare=False)
+
+
+@dataclass(frozen=True)
+class Statics:
+    """Mass matrix (n, n) and gravity torques (n,) of joints with one coordinate, and centres of mass (3,).
+
+    The loops of the tree are open. ``mass`` and ``gravity`` are None for a library without dynamics.
+    """
+
+    joints: tuple[str, ...]
+    mass: Matrix | None
+    gravity: Vector | None
+    centres: dict[str, Vector]
+
+
+def vector(values: Iterable[Any]) -> Vector:
+    """Return numbers as a tuple of floats."""
+    return tuple(float(value) for value in values)
+
+
+def matrix(rows: Iterable[Iterable[Any]]) -> Matrix:
+    """Return rows of numbers as tuples of floats."""
+    return tuple(vector(row) for row in rows)
+
+
+def coefficients(*values: Any) -> Vector:
+    """Return the coefficients of rising powers without zeros at the end."""
+    found = [float(value) for value in values]
+    while found and not found[-1]:
+        found.pop()
+    return tuple(found)
+
+
+def limits(lower: Any, upper: Any, none_above: float = math.inf) -> dict[str, Any]:
+    """Return the fields of limits; ends of at least ``none_above`` in size are no limit."""
+    ends = float(lower), float(upper)
+    low, high = (e if abs(e) < none_above else math.copysign(math.inf, e) for e in ends)
+    return {"lower": low, "upper": high}

@@ -1,0 +1,173 @@
+"""MuJoCo's reader of MJCF and URDF, and the machine in its compiled model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.loaders.loader import MJCF, URDF, Loaded, Loader
+from crosscheck.engines.loaders.machine import (
+    FIXED,
+    REVOLUTE,
+    TRANSLATIONAL,
+    WORLD,
+    Body,
+    Coupling,
+    Joint,
+    Loop,
+    Machine,
+    Statics,
+    Vector,
+    coefficients,
+    limits,
+    matrix,
+    vector,
+)
+
+TYPES = {0: "free", 1: "spherical", 2: TRANSLATIONAL, 3: REVOLUTE}  # by mjtJoint
+
+
+class Mujoco(Loader):
+    """MuJoCo's compiler with its default options."""
+
+    name = "mujoco"
+    package = "mujoco"
+    version = "4.0.0"
+    formats = (MJCF, URDF)
+
+    def load(self, path: Path, form: str) -> Loaded:
+        """Compile the file."""
+        import mujoco
+
+        return Compiled(mujoco, mujoco.MjModel.from_xml_path(str(path)))
+
+
+class Compiled(Loaded):
+    """A compiled model at its reference pose ``qpos0``."""
+
+    def __init__(self, mujoco: Any, model: Any):
+        self.mujoco, self.model = mujoco, model
+        self.data = mujoco.MjData(model)
+        self.place()
+
+    def place(self) -> None:
+        """Compute the bodies' places at the present pose."""
+        for step in (self.mujoco.mj_kinematics, self.mujoco.mj_comPos, self.mujoco.mj_crb):
+            step(self.model, self.data)
+
+    def body(self, number: int) -> str:
+        """Return the name of a body."""
+        return str(self.model.body(number).name) or f"body {number}" if number else WORLD
+
+    def joint(self, number: int) -> str:
+        """Return the name of a joint."""
+        return str(self.model.joint(number).name) or f"joint {number}"
+
+    def machine(self) -> Machine:
+        m, flags = self.model, self.mujoco.mjtDisableBit
+        off = bool(m.opt.disableflags & flags.mjDSBL_GRAVITY)
+        equal = not m.opt.disableflags & (flags.mjDSBL_EQUALITY | flags.mjDSBL_CONSTRAINT)
+        return Machine(
+            bodies=tuple(map(self._body, range(1, m.nbody))),
+            joints=tuple(self._joints()),
+            loops=tuple(self._loops()) if equal else (),
+            couplings=tuple(self._couplings()) if equal else (),
+            gravity=(0.0, 0.0, 0.0) if off else vector(m.opt.gravity),
+        )
+
+    def _body(self, b: int) -> Body:
+        turn = self.data.ximat[b].reshape(3, 3)
+        inertia = turn @ np.diag(self.model.body_inertia[b]) @ turn.T
+        centre = vector(self.data.xipos[b])
+        return Body(self.body(b), float(self.model.body_mass[b]), centre, matrix(inertia))
+
+    def _joints(self) -> Iterator[Joint]:
+        m = self.model
+        for b in range(1, m.nbody):
+            pair = self.body(int(m.body_parentid[b])), self.body(b)
+            if not m.body_jntnum[b]:
+                yield Joint(f"{pair[1]} fixed", FIXED, pair)
+            first = int(m.body_jntadr[b])
+            yield from (self._joint(j, pair) for j in range(first, first + int(m.body_jntnum[b])))
+
+    def _joint(self, j: int, pair: tuple[str, str]) -> Joint:
+        m, kind, dof = self.model, int(self.model.jnt_type[j]), int(self.model.jnt_dofadr[j])
+        name, anchor = self.joint(j), vector(self.data.xanchor[j])
+        acting = m.jnt_limited[j] and not m.opt.disableflags & self.mujoco.mjtDisableBit.mjDSBL_LIMIT
+        common: dict[str, Any] = {
+            "damping": coefficients(m.dof_damping[dof], *m.dof_dampingpoly[dof]),
+            "stiffness": coefficients(m.jnt_stiffness[j], *m.jnt_stiffnesspoly[j]),
+            "armature": float(m.dof_armature[dof]),
+            "friction": float(m.dof_frictionloss[dof]),
+        }
+        if TYPES[kind] not in (REVOLUTE, TRANSLATIONAL):
+            return Joint(name, TYPES[kind], pair, anchor, **common)
+        q, ends = int(m.jnt_qposadr[j]), m.jnt_range[j] if acting else (-math.inf, math.inf)
+        return Joint(
+            name,
+            TYPES[kind],
+            pair,
+            anchor,
+            vector(self.data.xaxis[j]),
+            reference=float(m.qpos0[q]),
+            rest=float(m.qpos_spring[q]) if m.jnt_stiffness[j] or any(m.jnt_stiffnesspoly[j]) else None,
+            **limits(*ends),
+            **common,
+        )
+
+    def _loops(self) -> Iterator[Loop]:
+        m, kinds = self.model, self.mujoco.mjtEq
+        names = {int(kinds.mjEQ_CONNECT): "spherical", int(kinds.mjEQ_WELD): FIXED}
+        for e in np.flatnonzero(m.eq_active0):
+            kind, first, second = (int(v[e]) for v in (m.eq_type, m.eq_obj1id, m.eq_obj2id))
+            if kind not in names:
+                continue
+            if m.eq_objtype[e] == self.mujoco.mjtObj.mjOBJ_SITE:
+                bodies = self.body(int(m.site_bodyid[first])), self.body(int(m.site_bodyid[second]))
+                ends = vector(self.data.site_xpos[first]), vector(self.data.site_xpos[second])
+            else:
+                at = m.eq_data[e]
+                points = (at[0:3], at[3:6]) if kind == kinds.mjEQ_CONNECT else (at[3:6], at[0:3])
+                bodies = self.body(first), self.body(second)
+                ends = self._point(first, points[0]), self._point(second, points[1])
+            yield Loop(str(m.equality(e).name) or f"equality {e}", names[kind], bodies, ends)
+
+    def _point(self, body: int, local: np.ndarray) -> Vector:
+        return vector(self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ local)
+
+    def _couplings(self) -> Iterator[Coupling]:
+        m, kinds = self.model, self.mujoco.mjtEq
+        for e in np.flatnonzero(m.eq_active0):
+            kind, first, second = (int(v[e]) for v in (m.eq_type, m.eq_obj1id, m.eq_obj2id))
+            if kind not in (kinds.mjEQ_JOINT, kinds.mjEQ_TENDON):
+                continue
+            name_of = self.joint if kind == kinds.mjEQ_JOINT else (lambda k: f"tendon {m.tendon(k).name}")
+            leader = name_of(second) if second >= 0 else ""
+            name = str(m.equality(e).name) or f"equality {e}"
+            yield Coupling(name, name_of(first), leader, coefficients(*m.eq_data[e, :5]))
+
+    def statics(self, pose: Mapping[str, float], gravity: Vector) -> Statics:
+        m, data = self.model, self.data
+        single = [j for j in range(m.njnt) if TYPES[int(m.jnt_type[j])] in (REVOLUTE, TRANSLATIONAL)]
+        m.opt.gravity[:], m.opt.disableflags = gravity, 0
+        data.qpos[:], data.qvel[:] = m.qpos0, 0.0
+        for j in single:
+            data.qpos[m.jnt_qposadr[j]] += pose.get(self.joint(j), 0.0)
+        self.place()
+        self.mujoco.mj_comVel(m, data)
+        torque = np.zeros(m.nv)
+        self.mujoco.mj_rne(m, data, 0, torque)
+        dofs = [int(m.jnt_dofadr[j]) for j in single]
+        centres = {self.body(b): vector(data.xipos[b]) for b in range(1, m.nbody)}
+        names = tuple(self.joint(j) for j in single)
+        return Statics(names, matrix(self._mass()[np.ix_(dofs, dofs)]), vector(torque[dofs]), centres)
+
+    def _mass(self) -> np.ndarray:
+        """Return the mass matrix (nv, nv)."""
+        whole = np.zeros((self.model.nv, self.model.nv))
+        self.mujoco.mj_fullM(self.model, self.data, whole)
+        return whole

@@ -1,0 +1,173 @@
+"""One file in every engine: the file's meaning, planted differences by part and kind, verdicts and advice."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crosscheck.cli.commands import main
+from crosscheck.engines.loaders.loader import DOUBLE, MJCF, SDF, URDF
+from crosscheck.engines.loaders.machine import Machine, vector
+from crosscheck.engines.loaders.mujoco import Mujoco
+from crosscheck.engines.loaders.own import Own
+from crosscheck.files.corpus import CASES
+from crosscheck.files.corpus.case import value_at
+from crosscheck.files.corpus.mjcf import pair
+from crosscheck.files.differences import of_reading, of_statics
+from crosscheck.files.matching import matched
+from crosscheck.files.meaning import form_of, meant
+from crosscheck.files.merged import size_of
+from crosscheck.files.statics import poses
+
+ROUNDING = 1e-12  # m, rad, kg, kg m² of numbers near one, after some rotations
+NOT_OURS = ("spring polynomial", "damping polynomial", "coupling polynomial", "massless link")
+READERS = "tests.helpers.planted_readers"
+LOOP = pair(
+    '<connect name="close" body1="lower" body2="other" anchor="0.1 0 0.1"/>'
+    '<joint name="gear" joint1="side" joint2="elbow" polycoef="0.1 2 0 0 0"/>'
+)
+
+
+def written(folder: Path, text: str, name: str = "robot.xml") -> Path:
+    (folder / name).write_text(text)
+    return folder / name
+
+
+def named(kind: str, name: str, **changes: Any) -> Callable[[Machine], Machine]:
+    """Return the planting of a change into one part."""
+
+    def plant(machine: Machine) -> Machine:
+        parts = [replace(p, **changes) if p.name == name else p for p in getattr(machine, kind)]
+        return replace(machine, **{kind: tuple(parts)})
+
+    return plant
+
+
+def without(kind: str, name: str) -> Callable[[Machine], Machine]:
+    return lambda m: replace(m, **{kind: tuple(p for p in getattr(m, kind) if p.name != name)})
+
+
+TURNED = ((0.04, 0.0, 0.0), (0.0, 0.03, 0.0), (0.0, 0.0, 0.02))
+PLANTED = {  # part, name and field of a difference, and its planting
+    ("body", "upper", "mass"): named("bodies", "upper", mass=2.001),
+    ("body", "lower", "centre"): named("bodies", "lower", centre=(0.0, 0.001, 1.0)),
+    ("body", "other", "inertia"): named(
+        "bodies", "other", inertia=((0.04, 0, 0), (0, 0.03, 0), (0, 0, 0.02))
+    ),
+    ("body", "lower", "body"): without("bodies", "lower"),
+    ("joint", "shoulder", "axis"): named("joints", "shoulder", axis=(0.0, -1.0, 0.0)),
+    ("joint", "elbow", "axis"): named("joints", "elbow", axis=(0.0, 2.0, 0.0)),
+    ("joint", "side", "anchor"): named("joints", "side", anchor=(0.301, 0.0, 0.4)),
+    ("joint", "elbow", "type"): named("joints", "elbow", type="translational"),
+    ("joint", "elbow", "bodies"): named("joints", "elbow", bodies=("other", "lower")),
+    ("joint", "side", "joint"): without("joints", "side"),
+    ("joint", "elbow", "damping"): named("joints", "elbow", damping=(0.0, 0.1)),
+    ("joint", "elbow", "stiffness"): named("joints", "elbow", stiffness=(1.0,)),
+    ("joint", "elbow", "armature"): named("joints", "elbow", armature=0.1),
+    ("joint", "elbow", "friction"): named("joints", "elbow", friction=0.1),
+    ("joint", "elbow", "limits"): named("joints", "elbow", upper=1.0),
+    ("joint", "elbow", "reference"): named("joints", "elbow", reference=0.1),
+    ("loop", "close", "loop"): without("loops", "close"),
+    ("loop", "close", "anchor"): named("loops", "close", anchors=((0.1, 0, 0.9), (0.1, 0, 0.901))),
+    ("coupling", "side", "coupling"): without("couplings", "gear"),
+    ("coupling", "side", "law"): named("couplings", "gear", coefficients=(0.1, -2.0)),
+    ("gravity", "gravity", "gravity"): lambda machine: replace(machine, gravity=(0.0, 0.0, 9.81)),
+}
+
+
+@pytest.mark.parametrize("form", [MJCF, URDF, SDF])
+def test_corpus_means_what_the_specification_says(form: str, tmp_path: Path):
+    """Each file of the corpus states numbers of its feature, which are not taken from any reader."""
+    for case in (case for case in CASES if case.form == form):
+        path = written(tmp_path, case.text, case.file)
+        machine = meant(path, form_of(path))
+        for place, right in case.right.items():
+            found = value_at(machine, place)
+            is_text = isinstance(right, str) or (isinstance(right, tuple) and isinstance(right[0], str))
+            same = found == right if is_text else np.allclose(found, right, rtol=0, atol=ROUNDING)
+            assert same, f"{case.name}: {place} is {found}, not {right}"
+
+
+@pytest.mark.parametrize("step", [6, pytest.param(1, marks=pytest.mark.slow)], ids=["few", "all"])
+def test_own_import_builds_the_machine_of_each_file_of_the_corpus(step: int, tmp_path: Path):
+    """A scene has neither limits nor friction. NOT_OURS are files whose import lists a part that is left
+    out, or describes a massless link by other joints."""
+    for case in (case for case in CASES[::step] if case.name not in NOT_OURS):
+        path = written(tmp_path, case.text, case.file)
+        own = Own().load(path, case.form).machine()
+        found = of_reading(matched(meant(path, case.form), own, DOUBLE), DOUBLE)
+        assert {d.field for d in found} <= {"limits", "friction"}, (case.name, found)
+
+
+@pytest.mark.parametrize("planted", PLANTED, ids=" ".join)
+def test_planted_difference_is_named_by_part_and_field(planted: tuple[str, str, str], tmp_path: Path):
+    machine = meant(written(tmp_path, LOOP), MJCF)
+    found = of_reading(matched(machine, PLANTED[planted](machine), DOUBLE), DOUBLE)
+    assert [(d.part, d.name, d.field) for d in found] == [planted]
+
+
+def test_order_names_of_models_and_direction_of_a_joint_are_no_differences(tmp_path: Path):
+    """A reader may list parts in another order, write the model before names, and lead a joint from the
+    child to the parent, whose axis is then reversed."""
+    machine = meant(written(tmp_path, LOOP), MJCF)
+    side = next(joint for joint in machine.joints if joint.name == "side")
+    turned = replace(side, bodies=side.bodies[::-1], axis=vector(-np.array(side.axis)))
+    joints = tuple(turned if joint is side else joint for joint in machine.joints)
+    bodies = tuple(replace(body, name=f"arm/{body.name}") for body in reversed(machine.bodies))
+    own = replace(machine, bodies=bodies, joints=joints)
+    own = replace(own, joints=tuple(replace(j, bodies=renamed(j.bodies)) for j in own.joints))
+    own = replace(own, loops=tuple(replace(loop, bodies=renamed(loop.bodies)) for loop in own.loops or ()))
+    assert of_reading(matched(machine, own, DOUBLE), DOUBLE) == []
+
+
+def renamed(pair_of_bodies: tuple[str, str]) -> Any:
+    return tuple(name if name == "world" else f"arm/{name}" for name in pair_of_bodies)
+
+
+def test_mass_matrix_and_gravity_torques_are_mujocos_at_four_poses(tmp_path: Path):
+    """MuJoCo's own terms agree with those of the neutral form; 0.1 kg m² more armature differ."""
+    path = written(tmp_path, LOOP.replace('name="elbow"', 'name="elbow" armature="0.5"'))
+    machine, gravity = meant(path, MJCF), (1.0, 2.0, -9.0)
+    asked = poses(machine, size_of(machine))
+    own = [Mujoco().load(path, MJCF).statics(pose, gravity) for pose in asked]
+    assert of_statics(matched(machine, machine, DOUBLE), own, asked, gravity, ROUNDING) == []
+    heavier = named("joints", "elbow", armature=0.6)(machine)
+    found = of_statics(matched(heavier, machine, DOUBLE), own, asked, gravity, DOUBLE)
+    assert [(d.field, d.name) for d in found] == [("mass matrix", "elbow")]
+
+
+def test_verdict_names_what_is_dropped_and_whether_the_reader_says_so(tmp_path: Path, capsys: Any):
+    case = next(case for case in CASES if (case.form, case.name) == (URDF, "mimic offset"))
+    text = case.text.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><dynamics friction="0.2"/>', 1)
+    path = written(tmp_path, text, "robot.urdf")
+    assert main(["files", str(path), "--engine", f"{READERS}:Uncoupled", "--json"]) == 1
+    (found,) = json.loads(capsys.readouterr().out)["readers"]
+    assert found["grade"] == "another machine" and found["messages"] == [
+        "mimic of joint 'wrist' is not supported"
+    ]
+    assert "friction of joint shoulder (0.2) dropped without a message" in found["verdict"]
+    assert "wrist follows nothing (wrist = 0.3 + -1 elbow), dropped with a message" in found["verdict"]
+
+
+def test_advice_was_tried_and_refusals_have_the_readers_message(tmp_path: Path, capsys: Any):
+    """The strict reader needs a model's name; unit axes, which the file also lacks, do not help it."""
+    text = LOOP.replace(' model="arm"', "").replace(
+        'name="elbow" type="hinge" axis="0 1 0"', 'name="elbow" axis="0 2 0"'
+    )
+    assert main(["files", str(written(tmp_path, text)), "--engine", f"{READERS}:Strict"]) == 1
+    printed = capsys.readouterr().out
+    assert "cannot read: ValueError: the model has no name" in printed
+    assert printed.count("Tried:") == 1
+    assert "Tried: give the model a name, <mujoco model=…>. Result: the file's machine in strict." in printed
+
+
+def test_faulty_file_and_unknown_reader_are_refused_in_a_sentence(tmp_path: Path, capsys: Any):
+    bad = written(tmp_path, "<robot><link name='a'/><link name='b'/></robot>", "bad.urdf")
+    assert main(["files", str(bad)]) == 2
+    assert "the links are no tree with one root: a, b" in capsys.readouterr().err
+    assert main(["files", str(written(tmp_path, LOOP)), "--engine", "mojoco"]) == 2
+    assert "did you mean 'mujoco'" in capsys.readouterr().err
