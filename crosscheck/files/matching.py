@@ -194,7 +194,7 @@ def _counts(chain: Sequence[Joint]) -> tuple[int, int]:
 
 def _same_loop(match: Match, first: Loop, second: Loop) -> bool:
     own = match.of_file.pair(first.bodies)
-    return not second.type or match.in_file(second.bodies) in (own, own[::-1])
+    return not any(second.bodies) or match.in_file(second.bodies) in (own, own[::-1])
 
 
 def _same_coupling(first: Coupling, second: Coupling) -> bool:

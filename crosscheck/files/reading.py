@@ -12,11 +12,12 @@ from pathlib import Path
 from crosscheck.engines.loaders import loader
 from crosscheck.engines.loaders.loader import Built, Loader, built
 from crosscheck.engines.loaders.machine import Machine, Vector
-from crosscheck.files.differences import Difference, of_reading, of_statics
+from crosscheck.files.differences import Difference, of_reading
 from crosscheck.files.matching import matched
 from crosscheck.files.meaning import form_of, meant
 from crosscheck.files.merged import size_of
 from crosscheck.files.statics import Pose, poses
+from crosscheck.files.statics_differences import of_statics
 from crosscheck.processes.child import Child, ChildFailed
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s², of gravity torques where the file has no gravity
@@ -27,7 +28,7 @@ WITHOUT_STATICS = {  # fields on which neither mass matrix nor gravity torques d
 COLOURS = re.compile(r"(?:\x1b|\\x1b)\[[0-9;]*m")  # escape sequences of terminals
 Say = Callable[[str], None]
 
-SAME, ALMOST, ANOTHER, REFUSED = "the same machine", "the same but for", "another machine", "cannot read"
+SAME, ALMOST, ANOTHER, REFUSED = "the same machine", "the same except for", "another machine", "cannot read"
 
 
 @dataclass(frozen=True)

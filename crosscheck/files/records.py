@@ -18,6 +18,7 @@ from crosscheck.files.words import is_announced, sentences
 from crosscheck.processes.child import Child
 from mbref.records import looked_at
 
+FIELDS = {"lower": "limits", "upper": "limits", "anchors": "anchor", "coefficients": "law"}
 FILE = Path(__file__).parent / "records.jsonl.xz"
 Record = dict[str, Any]
 
@@ -67,17 +68,18 @@ def _of_reader(
                 reading = read_in(child, reader, file_of(_path(folder, case)), limit)
                 if case is cases[0]:
                     usual = {_signature(difference) for difference in reading.differences}
-                found.append(_record(case, reading, set() if case is cases[0] else usual))
+                record = _record(case, reading, set() if case is cases[0] else usual)
+                found.append(record | {"words": record["words"].replace(f"{folder}/{case.form}/", "")})
                 progress(f"{reader.name}: {case.form} {case.name}: {found[-1]['status']}")
     return found
 
 
 def _signature(difference: Difference) -> tuple[str, ...]:
-    return difference.kind, difference.part, difference.name, difference.field
+    return difference.kind, difference.part, difference.field
 
 
 def _record(case: Case, reading: Reading, usual: set[tuple[str, ...]]) -> Record:
-    about = {path.split()[-1] for path in case.right}
+    about = {FIELDS.get(name, name) for path in case.right for name in path.split()[-1:]}
     own = [d for d in reading.differences if _signature(d) not in usual or d.field in about]
     return {
         "key": f"{case.form} {case.name} {reading.reader}",

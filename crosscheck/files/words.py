@@ -7,6 +7,8 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from crosscheck.engines.loaders.machine import Machine
 from crosscheck.files.differences import ADDED, LOST, Difference
 from crosscheck.files.reading import ALMOST, ANOTHER, REFUSED, File, Reading
@@ -18,6 +20,8 @@ LETTERS = 2  # of a name that may be a word of a message by chance; it must stan
 PLURALS = {"body": "bodies", "joint": "joints", "loop": "loops", "coupling": "couplings"}
 WORDS = {  # words of a message that announce a lost part, by field
     "armature": ("armature", "rotor"),
+    "body": ("body", "link", "joint"),
+    "joint": ("joint",),
     "coupling": ("equality", "mimic", "coupling"),
     "damping": ("damping",),
     "friction": ("friction",),
@@ -84,7 +88,9 @@ def sentence(alike: Sequence[Difference], messages: Sequence[str]) -> str:
         return f"{parts} {'are' if several else 'is'} open, dropped {silently}"
     if first.field == "coupling":
         return f"{names} {'follow' if several else 'follows'} nothing ({file}), dropped {silently}"
-    value = "" if several or first.field in ("body", "joint") else f" ({file})"
+    if np.any(first.reader):
+        return f"{parts} is {own}, and the rest of {file} is dropped {silently}"
+    value = "" if several or first.field in ("body", "joint") else f" ({file.strip('()')})"
     return f"{parts}{value} dropped {silently}"
 
 
@@ -104,7 +110,7 @@ def verdict(reading: Reading) -> str:
     more = f"; and {len(told) - SHOWN} more" if len(told) > SHOWN else ""
     joined = "; ".join(told[:SHOWN]) + more
     if reading.grade == ALMOST:
-        return f"the same but for: {joined}"
+        return f"the same except for: {joined}"
     return f"another machine: {joined}" if reading.grade == ANOTHER else reading.grade
 
 

@@ -9,9 +9,10 @@ import pytest
 from crosscheck.engines.loaders.loader import DOUBLE, built
 from crosscheck.engines.loaders.pinocchio import Pinocchio
 from crosscheck.engines.mujoco.importing.reading import Source, source
-from crosscheck.files.differences import of_reading, of_statics
+from crosscheck.files.differences import of_reading
 from crosscheck.files.matching import matched
 from crosscheck.files.reading import file_of
+from crosscheck.files.statics_differences import of_statics
 from mbref.formats import ImportOptions
 from mbref.scene import SceneError
 from tests.crosscheck.originals import apart

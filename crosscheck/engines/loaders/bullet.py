@@ -38,10 +38,7 @@ class Bullet(Loader):
     package = "pybullet"
     version = "3.2.7"
     formats = (URDF, SDF, MJCF)
-    convention = (
-        "read with useFixedBase and URDF_USE_INERTIA_FROM_FILE, without which inertias are of shapes; "
-        "gravity is set by the program"
-    )
+    convention = "a URDF is read with useFixedBase and URDF_USE_INERTIA_FROM_FILE, which keeps its inertias"
 
     def load(self, path: Path, form: str) -> Loaded:
         """Load the file into an own physics server."""
@@ -57,14 +54,14 @@ class Bullet(Loader):
             bodies = list({SDF: pybullet.loadSDF, MJCF: pybullet.loadMJCF}[form](str(path)))
         if not bodies:
             raise ValueError("PyBullet returns no body")
-        return Multibodies(pybullet, bodies)
+        return Multibodies(pybullet, bodies, form != URDF)
 
 
 class Multibodies(Loaded):
     """Multibodies at the positions 0 of their joints."""
 
-    def __init__(self, pybullet: Any, numbers: list[int]):
-        self.p = pybullet
+    def __init__(self, pybullet: Any, numbers: list[int], has_gravity: bool):
+        self.p, self.has_gravity = pybullet, has_gravity  # of the file's format
         self.links = [(b, j) for b in numbers for j in range(BASE, pybullet.getNumJoints(b))]
         for b, j in self.links:
             if j != BASE and self._type(b, j) in SCALAR:
@@ -87,8 +84,12 @@ class Multibodies(Loaded):
         return Machine(
             bodies=tuple(self._body(b, j) for b, j in self.links),
             joints=tuple(self._joint(b, j) for b, j in self.links),
-            gravity=None,
+            gravity=self._gravity() if self.has_gravity else None,
         )
+
+    def _gravity(self) -> Vector:
+        found = self.p.getPhysicsEngineParameters()
+        return vector(found[f"gravityAcceleration{axis}"] for axis in "XYZ")
 
     def _body(self, b: int, j: int) -> Body:
         found = self.p.getDynamicsInfo(b, j)

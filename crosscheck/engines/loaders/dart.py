@@ -18,6 +18,7 @@ from crosscheck.engines.loaders.machine import (
     Body,
     Coupling,
     Joint,
+    Loop,
     Machine,
     Statics,
     Vector,
@@ -37,6 +38,12 @@ TYPES = {
     "UniversalJoint": "universal",
     "PlanarJoint": "planar",
     "ScrewJoint": "screw",
+}
+UNLIMITED = 1e16  # rad or m; SDF writes it for an axis without limits
+LOOPS = {
+    "WeldJointConstraint": FIXED,
+    "BallJointConstraint": "spherical",
+    "RevoluteJointConstraint": REVOLUTE,
 }
 
 
@@ -59,22 +66,21 @@ class Dart(Loader):
             reader = dartpy.utils.DartLoader()
             reader.setOptions(options)
             skeleton = reader.parseSkeleton(str(path))
-            skeletons, gravity = [skeleton] if skeleton else [], None
+            skeletons, world = [skeleton] if skeleton else [], None
         else:
             world = {SDF: dartpy.utils.SdfParser, MJCF: dartpy.utils.MjcfParser}[form].readWorld(str(path))
             number = world.getNumSkeletons() if world else 0
             skeletons = [world.getSkeleton(k) for k in range(number)]
-            gravity = vector(world.getGravity()) if world else None
         if not skeletons:
             raise ValueError("DART returns no skeleton")
-        return Skeletons(dartpy, skeletons, gravity)
+        return Skeletons(dartpy, skeletons, world)
 
 
 class Skeletons(Loaded):
-    """Skeletons at their initial positions."""
+    """Skeletons at their initial positions, in a world or without one."""
 
-    def __init__(self, dart: Any, skeletons: list[Any], gravity: Vector | None):
-        self.dart, self.skeletons, self.gravity = dart, skeletons, gravity
+    def __init__(self, dart: Any, skeletons: list[Any], world: Any):
+        self.dart, self.skeletons, self.world = dart, skeletons, world
         self.joints = [s.getJoint(k) for s in skeletons for k in range(s.getNumJoints())]
         self.nodes = [s.getBodyNode(k) for s in skeletons for k in range(s.getNumBodyNodes())]
 
@@ -82,8 +88,9 @@ class Skeletons(Loaded):
         return Machine(
             bodies=tuple(map(self._body, self.nodes)),
             joints=tuple(map(self._joint, self.joints)),
+            loops=tuple(self._loops()),
             couplings=tuple(self._couplings()),
-            gravity=self.gravity,
+            gravity=None if self.world is None else vector(self.world.getGravity()),
         )
 
     def _at(self, node: Any) -> Place:
@@ -99,7 +106,8 @@ class Skeletons(Loaded):
         node, parent = joint.getChildBodyNode(), joint.getParentBodyNode()
         frame = joint.getTransformFromChildBodyNode()
         at = self._at(node).then(Place(np.array(frame.translation()), np.array(frame.rotation())))
-        kind = TYPES.get(joint.getType(), joint.getType())
+        is_still = not joint.getSkeleton().isMobile()
+        kind = FIXED if is_still else TYPES.get(joint.getType(), joint.getType())
         pair = parent.getName() if parent else WORLD, node.getName()
         name, anchor = joint.getName(), vector(at.position)
         if kind == "planar":
@@ -122,8 +130,17 @@ class Skeletons(Loaded):
             armature=0.0,
             friction=float(joint.getCoulombFriction(0)),
             reference=float(joint.getPosition(0)),
-            **limits(joint.getPositionLowerLimit(0), joint.getPositionUpperLimit(0)),
+            **limits(joint.getPositionLowerLimit(0), joint.getPositionUpperLimit(0), UNLIMITED),
         )
+
+    def _loops(self) -> Iterator[Loop]:
+        """Yield the world's constraints between bodies, whose bodies and anchors Python cannot ask."""
+        if self.world is None:
+            return
+        solver = self.world.getConstraintSolver()
+        for k in range(solver.getNumConstraints()):
+            kind = type(solver.getConstraint(k)).__name__
+            yield Loop("", LOOPS.get(kind, kind), ("", ""))
 
     def _couplings(self) -> Iterator[Coupling]:
         mimic = self.dart.dynamics.ActuatorType.MIMIC

@@ -40,6 +40,7 @@ TYPES = {
     "rpy_floating": "free",
 }
 STEP = 1e-3  # s, of the discrete plant: a continuous plant refuses constraints
+UNLIMITED = 1e16  # rad or m; SDF writes it for an axis without limits
 NUDGE = 0.1  # rad or m, displacement at which the force of a spring is measured
 
 
@@ -106,8 +107,7 @@ class Plant(Loaded):
         kind = TYPES.get(joint.type_name(), joint.type_name())
         name, anchor = joint.name(), vector(at.position)
         if kind == "screw":
-            axis = at.direction(joint.screw_axis())
-            return Joint(name, kind, pair, anchor, axis, pitch=float(joint.screw_pitch()))
+            return Joint(name, kind, pair, anchor, pitch=float(joint.screw_pitch()))  # no access to its axis
         if kind == "planar":
             return Joint(name, kind, pair, anchor, at.direction([0.0, 0.0, 1.0]))
         if kind not in SCALAR:
@@ -126,7 +126,7 @@ class Plant(Loaded):
             armature=sum(self._rotors(joint)),
             friction=0.0,
             reference=float(joint.default_positions()[0]),
-            **limits(joint.position_lower_limits()[0], joint.position_upper_limits()[0]),
+            **limits(joint.position_lower_limits()[0], joint.position_upper_limits()[0], UNLIMITED),
         )
 
     def _rotors(self, joint: Any) -> Iterator[float]:

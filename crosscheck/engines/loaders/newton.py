@@ -54,6 +54,10 @@ class Newton(Loader):
 
     def load(self, path: Path, form: str) -> Loaded:
         """Add the file to a builder."""
+        with contextlib.suppress(AttributeError):
+            import warp
+
+            warp.config.log_level = warp.LOG_ERROR
         import newton
 
         builder = newton.ModelBuilder()
@@ -105,13 +109,13 @@ class Builder(Loaded):
         return self._name(self.b.joint_parent[j]), self._name(self.b.joint_child[j])
 
     def machine(self) -> Machine:
-        loops = [j for j in range(self.b.joint_count) if j not in self.frames]
+        loops = [j for j in range(self.b.joint_count) if j not in self.frames and self.b.joint_enabled[j]]
         return Machine(
             bodies=tuple(map(self._body, range(self.b.body_count))),
             joints=tuple(joint for j in self.frames for joint in self._joints(j)),
             loops=tuple(self._loop(j) for j in loops),
             couplings=tuple(self._couplings()),
-            gravity=vector(np.array(self.b.up_vector) * float(np.array(self.b.gravity) @ self.b.up_vector)),
+            gravity=vector(self.b.gravity),
         )
 
     def _body(self, k: int) -> Body:
@@ -160,13 +164,15 @@ class Builder(Loaded):
             if leader >= 0:
                 names = str(b.joint_label[j]), str(b.joint_label[leader])
                 yield Coupling(names[0], *names, coefficients(*b.joint_mimic_coeffs[j]))
+        for k, follower in enumerate(b.constraint_mimic_joint0):
+            if b.constraint_mimic_enabled[k]:
+                leader = b.constraint_mimic_joint1[k]
+                names = str(b.joint_label[follower]), str(b.joint_label[leader])
+                law = b.constraint_mimic_coef0[k], b.constraint_mimic_coef1[k]
+                yield Coupling(names[0], *names, coefficients(*law))
 
     def statics(self, pose: Mapping[str, float], gravity: Vector) -> Statics:
         """Return Newton's mass matrix in single precision; it gives gravity torques to its solvers alone."""
-        with contextlib.suppress(AttributeError):
-            import warp
-
-            warp.config.log_level = warp.LOG_ERROR
         model = self.b.finalize(device="cpu")
         q, names, dofs = model.joint_q.numpy(), list[str](), list[int]()
         for j in self.frames:

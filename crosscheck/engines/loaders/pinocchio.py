@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.loaders.loader import MJCF, SDF, URDF, Loaded, Loader
+from crosscheck.engines.loaders.loader import MJCF, URDF, Loaded, Loader
 from crosscheck.engines.loaders.machine import (
     FIXED,
     REVOLUTE,
@@ -56,11 +56,11 @@ class Pinocchio(Loader):
     name = "pinocchio"
     package = "pin"
     version = "4.1.0"
-    formats = (MJCF, URDF, SDF)
+    formats = (MJCF, URDF)  # packages of Pinocchio have no reader of SDF
     convention = "read with mimic=True: without it followers are free"
 
     def load(self, path: Path, form: str) -> Loaded:
-        """Build the model; raises RuntimeError for SDF if this build has no reader of SDF."""
+        """Build the model and its constraints."""
         import pinocchio
 
         if form == URDF:
@@ -70,19 +70,14 @@ class Pinocchio(Loader):
             except ValueError as refusal:  # such as a follower without limits: built with free followers
                 said = f"mimic=True: {str(refusal).strip().splitlines()[-1]}"
                 return Built(pinocchio, free, [], free, said)
-        if form == MJCF:
-            model, *found = pinocchio.buildModelAndConstraintsFromMJCF(str(path))
-            return Built(pinocchio, model, [c for group in found for c in group], model)
-        if not pinocchio.WITH_SDFORMAT:
-            raise RuntimeError("this build of Pinocchio has no reader of SDF")
-        model = pinocchio.buildModelsFromSdf(str(path), geometry_types=[])[0]
-        return Built(pinocchio, model, [], model)
+        model, *found = pinocchio.buildModelAndConstraintsFromMJCF(str(path))
+        return Built(pinocchio, model, [c for group in found for c in group], model)
 
 
 class Built(Loaded):
-    """A model at its neutral configuration, or at the configuration ``qpos0`` of an MJCF file.
+    """A model at its neutral configuration, or at ``qpos0`` of an MJCF file.
 
-    The followers of ``coupled`` have no coordinates, and those of ``model`` are free.
+    Followers of other joints are free in ``model``, and have no coordinates in ``coupled``.
     """
 
     def __init__(self, pinocchio: Any, model: Any, constraints: list[Any], coupled: Any, said: str = ""):

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from crosscheck.files.corpus import mjcf, sdf, urdf
+from crosscheck.files.corpus import mjcf, mjcf_equalities, sdf, urdf
 
-CASES = (*mjcf.CASES, *urdf.CASES, *sdf.CASES)
+CASES = (*mjcf.CASES, *mjcf_equalities.CASES, *urdf.CASES, *sdf.CASES)

@@ -26,6 +26,7 @@ from crosscheck.engines.loaders.machine import (
     Loop,
     Machine,
     coefficients,
+    limits,
     vector,
 )
 from crosscheck.engines.loaders.placing import Place
@@ -35,6 +36,7 @@ from crosscheck.engines.sdf.frames import Frames, check_names, numbers, pose_of
 from crosscheck.engines.sdf.including import expanded
 from mbref.scene import SceneError
 
+UNLIMITED = 1e16  # rad or m, default of limits of a joint
 GRAVITY = (0.0, 0.0, -9.8)  # m/s², default of the element <gravity> of a world
 TYPES = {
     "revolute": REVOLUTE,
@@ -94,10 +96,8 @@ def _joint(joint: ET.Element, frames: Frames) -> Joint:
     along = vector(direction(axis, name, at, frames))
     if kind == "screw":
         return Joint(name, kind, pair, anchor, along, pitch=pitch(joint))
-    lower, upper = (-math.inf, math.inf) if axis is None else limits_of(axis, name)
-    if given == "continuous":
-        lower, upper = -math.inf, math.inf
-    return Joint(name, kind, pair, anchor, along, lower=lower, upper=upper, **_dynamics(axis, name))
+    span = (-math.inf, math.inf) if axis is None or given == "continuous" else limits_of(axis, name)
+    return Joint(name, kind, pair, anchor, along, **limits(*span, UNLIMITED), **_dynamics(axis, name))
 
 
 def _dynamics(axis: ET.Element | None, name: str) -> dict[str, Any]:

@@ -16,12 +16,13 @@ from crosscheck.engines.loaders.mujoco import Mujoco
 from crosscheck.engines.loaders.own import Own
 from crosscheck.files.corpus import CASES
 from crosscheck.files.corpus.case import value_at
-from crosscheck.files.corpus.mjcf import pair
-from crosscheck.files.differences import of_reading, of_statics
+from crosscheck.files.corpus.mjcf_equalities import pair
+from crosscheck.files.differences import of_reading
 from crosscheck.files.matching import matched
 from crosscheck.files.meaning import form_of, meant
 from crosscheck.files.merged import size_of
 from crosscheck.files.statics import poses
+from crosscheck.files.statics_differences import of_statics
 
 ROUNDING = 1e-12  # m, rad, kg, kg m² of numbers near one, after some rotations
 NOT_OURS = ("spring polynomial", "damping polynomial", "coupling polynomial", "massless link")
