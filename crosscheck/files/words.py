@@ -88,7 +88,7 @@ def sentence(alike: Sequence[Difference], messages: Sequence[str]) -> str:
         return f"{parts} {'are' if several else 'is'} open, dropped {silently}"
     if first.field == "coupling":
         return f"{names} {'follow' if several else 'follows'} nothing ({file}), dropped {silently}"
-    if np.any(first.reader):
+    if first.field != "limits" and np.any(first.reader):
         return f"{parts} is {own}, and the rest of {file} is dropped {silently}"
     value = "" if several or first.field in ("body", "joint") else f" ({file.strip('()')})"
     return f"{parts}{value} dropped {silently}"
