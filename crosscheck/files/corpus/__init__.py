@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from crosscheck.files.corpus import mjcf, mjcf_equalities, sdf, urdf
+from crosscheck.files.corpus import mjcf, mjcf_equalities, sdf, sdf_models, urdf
 
-CASES = (*mjcf.CASES, *mjcf_equalities.CASES, *urdf.CASES, *sdf.CASES)
+CASES = (*mjcf.CASES, *mjcf_equalities.CASES, *urdf.CASES, *sdf.CASES, *sdf_models.CASES)
