@@ -2,7 +2,7 @@
 
 A table is joined by its cubic spline, found from the second derivatives at its rows: tridiagonal equations,
 whose ends are eliminated because the third derivative is continuous at the second and at the last but one
-row.
+row. The equations of a periodic table form a ring, which is cut at one row and closed by its superposition.
 """
 
 from __future__ import annotations
@@ -102,30 +102,69 @@ def piece_of(function: TimeFunction, since: float, arithmetic: Arithmetic) -> Pi
         return Piece(acts, arithmetic.number(0.0), arithmetic.zeros(4))
     times = [t for t, _ in function.table]
     k = min(max(int(np.searchsorted(times, now, side="right")) - 1, 0), len(times) - 2)
-    return Piece(acts, arithmetic.number(times[k]), _spline(function.table, arithmetic)[k])
+    return Piece(acts, arithmetic.number(times[k]), _spline(function.table, function.periodic, arithmetic)[k])
 
 
 @functools.lru_cache(maxsize=64)
-def _spline(table: tuple[tuple[float, float], ...], arithmetic: Arithmetic) -> np.ndarray:
+def _spline(table: tuple[tuple[float, float], ...], periodic: bool, arithmetic: Arithmetic) -> np.ndarray:
     """Return coefficients (n - 1, 4) of the cubics between n rows, ascending, about the earlier row."""
     x, y = (arithmetic.array(column) for column in zip(*table, strict=True))
-    h, last = x[1:] - x[:-1], len(x) - 1
+    h = x[1:] - x[:-1]
     slope = (y[1:] - y[:-1]) / h
+    second = (_in_a_ring if periodic else _between_ends)(h, slope, arithmetic)
+    linear = slope - h * (2 * second[:-1] + second[1:]) / 6
+    return arithmetic.settled(
+        np.stack([y[:-1], linear, second[:-1] / 2, (second[1:] - second[:-1]) / (6 * h)], axis=1)
+    )
+
+
+def _between_ends(h: np.ndarray, slope: np.ndarray, arithmetic: Arithmetic) -> np.ndarray:
+    """Return the second derivatives (n,) at the rows, for intervals h and slopes (n - 1,), not-a-knot."""
+    last = len(h)
     lower, upper = h[:-1] + 0 * h[1:], h[1:] + 0 * h[:-1]
     diagonal, right = 2 * (h[:-1] + h[1:]), 6 * (slope[1:] - slope[:-1])
     first, final = h[0] / h[1], h[-1] / h[-2]
     diagonal[0], upper[0] = diagonal[0] + h[0] * (1 + first), upper[0] - h[0] * first
     diagonal[-1], lower[-1] = diagonal[-1] + h[-1] * (1 + final), lower[-1] - h[-1] * final
-    for i in range(1, last - 1):
+    second = arithmetic.zeros(last + 1)
+    second[1:last] = _tridiagonal(lower, diagonal, upper, right, arithmetic)
+    second[0] = second[1] - first * (second[2] - second[1])
+    second[last] = second[last - 1] + final * (second[last - 1] - second[last - 2])
+    return second
+
+
+def _in_a_ring(h: np.ndarray, slope: np.ndarray, arithmetic: Arithmetic) -> np.ndarray:
+    """Return the second derivatives (n,) at the rows of a period, of which the last one repeats the first.
+
+    The ring is cut at the first row: its second derivative is 0, and then 1 with no right-hand side. The
+    equation of the first row determines the share of the second solution.
+    """
+    before = np.concatenate([h[-1:], h[:-1]])
+    right = 6 * (slope - np.concatenate([slope[-1:], slope[:-1]]))
+    rest = slice(1, None)
+    parts = before[rest] + 0 * h[rest], 2 * (before + h)[rest], h[rest] + 0 * before[rest]
+    ends = arithmetic.zeros(len(h) - 1)
+    ends[0], ends[-1] = ends[0] - before[1], ends[-1] - h[-1]
+    cut, moved = (_tridiagonal(*parts, side, arithmetic) for side in (right[rest], ends))
+    diagonal = 2 * (before[0] + h[0])
+    share = (right[0] - before[0] * cut[-1] - h[0] * cut[0]) / (
+        diagonal + before[0] * moved[-1] + h[0] * moved[0]
+    )
+    second = arithmetic.zeros(len(h) + 1)
+    second[0], second[1:-1], second[-1] = share, cut + share * moved, share
+    return second
+
+
+def _tridiagonal(
+    lower: np.ndarray, diagonal: np.ndarray, upper: np.ndarray, right: np.ndarray, arithmetic: Arithmetic
+) -> np.ndarray:
+    """Return the solution (k,) of k tridiagonal equations; ``lower[0]`` and ``upper[-1]`` are not read."""
+    diagonal, right, count = diagonal.copy(), right.copy(), len(right)
+    for i in range(1, count):
         factor = lower[i] / diagonal[i - 1]
         diagonal[i] = diagonal[i] - factor * upper[i - 1]
         right[i] = right[i] - factor * right[i - 1]
-    second = arithmetic.zeros(last + 1)
-    for i in range(last - 2, -1, -1):
-        second[i + 1] = (right[i] - upper[i] * second[i + 2]) / diagonal[i]
-    second[0] = second[1] - first * (second[2] - second[1])
-    second[last] = second[last - 1] + final * (second[last - 1] - second[last - 2])
-    linear = slope - h * (2 * second[:-1] + second[1:]) / 6
-    return arithmetic.settled(
-        np.stack([y[:-1], linear, second[:-1] / 2, (second[1:] - second[:-1]) / (6 * h)], axis=1)
-    )
+    found = arithmetic.zeros(count + 1)
+    for i in range(count - 1, -1, -1):
+        found[i] = (right[i] - upper[i] * found[i + 1]) / diagonal[i]
+    return found[:count]

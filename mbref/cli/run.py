@@ -20,6 +20,7 @@ from mbref.motions.outputs import UNIT_OF
 from mbref.records import strict_json
 from mbref.scene import Scene
 from mbref.scene.bodies import DRIVER
+from mbref.scene.interpolation import interpolation_notes
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -152,6 +153,8 @@ def show(
         out.print(trajectory.message)
     if trajectory.error_estimate is not None:
         out.print(trajectory.error_estimate.sentence)
+    for note in interpolation_notes(scene):
+        out.print(note)
     out.print(
         f"{cost.steps} steps, {cost.rejected} rejected, {cost.rhs} evaluations\n"
         f"{cost.factorisations} factorisations, {cost.newton} Newton iterations\n"

@@ -108,7 +108,8 @@ class Driver(TimeFunction):
         start = polynomial[0] + (sine.amplitude * math.sin(sine.phase) if sine else 0.0)
         what = "c0 + amplitude·sin(phase) must be 0, motion is measured from t = 0"
         if table:
-            start += cls.model_construct(sine=None, table=table, polynomial=(0.0,)).pieces()[0].cubic[0]
+            rows = {"table": table, "periodic": info.data["periodic"]}
+            start += cls.model_construct(sine=None, polynomial=(0.0,), **rows).pieces()[0].cubic[0]
             what = "the value at t = 0 must be 0, because the motion is measured from its start"
         if abs(start) > 1e-12:  # otherwise it is rounding
             raise ValueError(f"{what}; got {start:g}")

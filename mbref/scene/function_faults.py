@@ -33,7 +33,7 @@ def table_faults(path: str, function: Any, data: Mapping[str, Any], start: float
     end = min(stop, _number(1.0 if duration is None else duration))
     if rows[0][0] > start:
         yield path, f"leaves a gap: its first row is at {rows[0][0]:g} s, but it acts from {start:g} s on"
-    if rows[-1][0] < end:
+    if rows[-1][0] < end and not field_of(function, "periodic"):
         yield path, f"leaves a gap: its last row is at {rows[-1][0]:g} s, but it acts until {end:g} s"
 
 

@@ -2,7 +2,7 @@
 
 A table is interpolated by a cubic spline: twice continuously differentiable, "not-a-knot" at both ends. So
 the spline through values of a cubic polynomial equals the polynomial (C. de Boor, A Practical Guide to
-Splines, 1978, chapter IV).
+Splines, 1978, chapter IV). A periodic table repeats itself; its spline is as smooth where a period ends.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
-from pydantic import BeforeValidator, field_validator
+from pydantic import BeforeValidator, ValidationInfo, field_validator
 
 from mbref.scene.fields import (
     Angle,
@@ -29,6 +29,8 @@ from mbref.scene.fields import (
     unit_of,
 )
 
+MOST_PERIODS = 100_000  # of a periodic table
+CLOSED_TABLE = 1e-9  # difference of the first and last value of a period / largest value that is rounding
 FEWEST_ROWS = 4  # least number of rows of a table; four rows determine a cubic polynomial
 
 Row = tuple[Annotated[Real, unit_of("time")], Measure]
@@ -56,15 +58,17 @@ class Piece(NamedTuple):
 class TimeFunction(SceneEntry):
     """polynomial + sine + table; each part is optional.
 
-    ``table`` has rows (time in s, value), times increasing.
+    ``table`` has rows (time in s, value), times increasing. A ``periodic`` table begins and ends with one
+    value; a scene repeats its rows up to the duration.
     """
 
+    periodic: bool = False
     sine: Sine | None = None
     table: Table | None = None
 
     @field_validator("table")
     @classmethod
-    def _table_makes_a_spline(cls, table: Any) -> Any:
+    def _table_makes_a_spline(cls, table: Any, info: ValidationInfo) -> Any:
         if table is None:
             return None
         if len(table) < FEWEST_ROWS:
@@ -74,7 +78,18 @@ class TimeFunction(SceneEntry):
                 raise ValueError(
                     f"times must increase, but row {k + 1} is at {after:g} s and row {k} at {before:g} s"
                 )
-        return table
+        return _closed(table) if info.data.get("periodic") else table
+
+    def repeated(self, until: float) -> Self:
+        """Return the function with the rows of a periodic table repeated up to a time (s), at most
+        MOST_PERIODS times."""
+        if not (self.periodic and self.table) or self.table[-1][0] >= until:
+            return self
+        (first, _), *_, (last, _) = self.table
+        count = min(math.ceil((until - first) / (last - first)), MOST_PERIODS)
+        rows = [(t + k * (last - first), x) for k in range(count) for t, x in self.table[:-1]]
+        end = first + count * (last - first), self.table[-1][1]
+        return self.model_copy(update={"table": (*rows, end)})
 
     @property
     def coefficients(self) -> tuple[float, ...]:
@@ -106,7 +121,7 @@ class TimeFunction(SceneEntry):
         from scipy.interpolate import CubicSpline  # only scenes with tables need it
 
         times, values = zip(*self.table, strict=True)
-        spline = CubicSpline(times, values)
+        spline = CubicSpline(times, values, bc_type="periodic" if self.periodic else "not-a-knot")
         rows = np.clip(np.searchsorted(times, begins, side="right") - 1, 0, len(times) - 2)
         for begin, k in zip(begins, rows.tolist(), strict=True):
             a, b, c, d = spline.c[::-1, k].tolist()
@@ -142,6 +157,15 @@ class TimeFunction(SceneEntry):
         """True if the value never changes."""
         still = self.sine is None or self.sine.amplitude == 0.0
         return still and not any(self.coefficients[1:]) and self.table is None and len(self.pieces()) == 1
+
+
+def _closed(table: tuple[Row, ...]) -> tuple[Row, ...]:
+    """Return the rows of a period with equal values at both ends; raises ValueError if they differ by more
+    than rounding."""
+    (_, first), *inner, (end, last) = table
+    if abs(last - first) > CLOSED_TABLE * max(abs(x) for _, x in table):
+        raise ValueError(f"periodic, but begins with {first:g} and ends with {last:g}")
+    return (table[0], *inner, (end, first))
 
 
 class Factor(TimeFunction):

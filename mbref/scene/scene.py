@@ -72,7 +72,22 @@ class Scene(SceneEntry):
                 faults.setdefault(path, message)
         if faults or scene is None:
             raise SceneError(list(named_paths(data if isinstance(data, Mapping) else {}, faults)))
+        scene.__dict__.update(scene._repeated(scene.duration))
         return scene
+
+    def _repeated(self, until: float) -> dict[str, Any]:
+        """Return the fields in which periodic tables are too short for a time (s), with more periods."""
+        found: dict[str, Any] = {}
+        driver = tuple(each.repeated(until) for each in self.driver)
+        if any(a is not b for a, b in zip(driver, self.driver, strict=True)):
+            found["driver"] = driver
+        factors = [load.over_time and load.over_time.repeated(until) for load in self.load]
+        if any(a is not load.over_time for a, load in zip(factors, self.load, strict=True)):
+            found["load"] = tuple(
+                load.model_copy(update={"factor": factor}) if factor else load
+                for factor, load in zip(factors, self.load, strict=True)
+            )
+        return found
 
     def body_index(self, name: str) -> int:
         """Return the index of a body in ``body``.

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mbref.equations.functions import functions_of
 from mbref.equations.matrices import Matrices
 from mbref.input_error import InputError
 from mbref.kernels.background import compiled_in_background
@@ -103,6 +104,8 @@ def simulate(
     if rtol is not None:
         limits = replace(limits, rtol=rtol)
     times = checked_times(np.linspace(0.0, scene.duration, SAMPLES) if times is None else times)
+    if times[-1] > scene.duration and any(function.periodic for function in functions_of(scene)):
+        scene = scene.with_(duration=float(times[-1]))  # periodic tables repeat up to there
     if formulation is not None:
         if method is not None:
             raise InputError("give a method or a formulation of your own, not both")

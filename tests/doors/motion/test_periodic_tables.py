@@ -1,0 +1,87 @@
+"""Periodic tables repeat with a smooth spline, also for the judge; the error of interpolation is stated."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+import mbref
+from crosscheck.judge.arithmetic import EXTENDED, doubles
+from crosscheck.judge.reference.taylor import natural_motion
+from crosscheck.judge.reference.tree import tree_motion
+from mbref.cli import main
+from mbref.scene import Driver, Factor, JointForce, SceneError
+from mbref.scene.interpolation import interpolation_error
+from tests.helpers.loads_over_time import AXIS, slide, wheel
+
+PERIOD = 0.8
+TIMES = np.array([0.0, 0.1, 0.17, 0.4, 0.55, 0.7, 0.8])
+VALUES = np.array([0.0, 0.5, 0.2, -0.6, 0.1, 0.4, 0.0])  # rad, and of a factor
+TABLE = tuple(zip(TIMES.tolist(), VALUES.tolist(), strict=True))
+SAMPLES = np.linspace(0.0, 2.5, 26)
+EXACT = CubicSpline(TIMES, VALUES, bc_type="periodic")
+
+
+def driven(duration: float = 2.5) -> mbref.Scene:
+    """A wheel that a periodic table turns over more than three periods."""
+    driver = Driver(joint="J", table=TABLE, periodic=True)
+    return wheel().with_(load=(), driver=(driver,), duration=duration)
+
+
+@pytest.mark.parametrize("method", ["taylor", "lm1+projection"])
+@pytest.mark.parametrize("duration", [2.5, 0.8, 1.0])
+def test_wheel_turns_by_the_periodic_spline_through_the_rows_of_its_driver(duration, method):
+    """Angles and accelerations of SciPy's spline, also at times beyond the scene's duration."""
+    motion = mbref.simulate(driven(duration), method, SAMPLES, rtol=1e-12)
+    assert motion.joint("J").angle == pytest.approx(EXACT(SAMPLES % PERIOD), abs=1e-12)
+    assert motion.angular_acceleration[:, 0, 2] == pytest.approx(EXACT(SAMPLES % PERIOD, 2), abs=1e-9)
+
+
+def test_mass_under_a_periodic_force_moves_as_both_formulations_of_the_reference(tmp_path):
+    """∬ a dt² of the spline from rest, with a linear part: its mean acts, too. A saved scene moves alike."""
+    load = JointForce(joint="J", force=2.0, factor=Factor(table=TABLE, periodic=True))
+    scene = slide(load).with_(duration=2.5)
+    scene.save(tmp_path / "slide.toml")
+    whole = CubicSpline(*np.array(scene.load[0].factor.table).T, bc_type="periodic").antiderivative(2)
+    exact = whole(SAMPLES) - whole(0.0) - whole(0.0, 1) * SAMPLES
+    moved = mbref.simulate(mbref.Scene.from_file(tmp_path / "slide.toml"), times=SAMPLES, rtol=1e-12)
+    assert moved.joint("J").displacement == pytest.approx(exact, abs=1e-11)
+    for found in (
+        natural_motion(scene, SAMPLES, EXTENDED),
+        tree_motion(scene, SAMPLES, EXTENDED, seconds=100.0),
+    ):
+        moved = (doubles(found.position[:, 0]) - scene.body[0].position) @ AXIS
+        assert not found.reason and np.abs(moved - exact).max() < 1e-13
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+@pytest.mark.parametrize("rows", [9, 21, 40])
+def test_stated_error_of_interpolation_is_the_error_within_a_factor_of_three(
+    rows, periodic, tmp_path, capsys
+):
+    """A table of 0.3 sin(2 π t): the largest difference of the second derivatives. A periodic spline is
+    better, and the note of a run proposes it."""
+    t = np.linspace(0.0, 1.0, rows)
+    table = [(time, 0.3 * np.sin(2 * np.pi * time)) for time in t[:-1]] + [(1.0, 0.0)]
+    driver = Driver(joint="J", table=table, periodic=periodic)
+    fine = np.linspace(0.0, 1.0, 500)
+    spline = CubicSpline(*np.array(table).T, bc_type="periodic" if periodic else "not-a-knot")
+    error = np.abs(spline(fine, 2) + 0.3 * (2 * np.pi) ** 2 * np.sin(2 * np.pi * fine)).max()
+    estimate, largest = interpolation_error(driver, 2)
+    assert error / 3 < estimate < 3 * error and largest == pytest.approx(0.3 * 4 * np.pi**2, rel=0.3)
+    wheel().with_(load=(), driver=(driver,), duration=1.0).save(tmp_path / "wheel.toml")
+    assert main(["run", str(tmp_path / "wheel.toml"), "--samples", "2", "--estimate", "no"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"driver(J): interpolation between {rows} rows leaves acceleration uncertain by about" in said
+    assert ("or periodic = true" in said) == (not periodic)
+
+
+@pytest.mark.parametrize(
+    ("table", "says"),
+    [
+        ([*TABLE[:-1], (0.8, 0.1)], "periodic, but begins with 0 and ends with 0.1"),
+        ([(t + 0.1, x) for t, x in TABLE], "its first row is at 0.1 s, but it acts from 0 s on"),
+    ],
+)
+def test_periodic_table_that_does_not_close_or_cover_the_start_is_refused(table, says):
+    with pytest.raises(SceneError, match=says):
+        wheel().with_(driver=({"joint": "J", "table": table, "periodic": True},))
