@@ -196,6 +196,10 @@ class Translational(_AxisJoint):
     type: Literal["translational"] = "translational"
     armature: RotorMass = 0.0
 
+    @property
+    def reflected_inertia(self) -> float:
+        return self.armature
+
 
 class Cylindrical(_TurningJoint):
     """Displacement along and rotation about ``axis``; ``armature`` is of the rotation."""
