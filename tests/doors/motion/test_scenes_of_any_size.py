@@ -109,6 +109,32 @@ def test_joints_of_walking_legs_stay_closed_and_their_energy_constant(method):
     assert abs(turned[names["crank"]]) > 0.1
 
 
+def test_links_of_a_strandbeest_have_jansens_holy_numbers():
+    """Distances (cm) of hinges that share a link, and of the axle from both pivots; rods have 1 kg/m."""
+    scene = find_scene("strandbeest[3]")
+    at = {joint.name: np.array(joint.anchor)[:2] * 100 for joint in scene.joint}
+    mass = {body.name: body.mass * 100 for body in scene.body}
+    holy = {"j": 50.0, "k": 61.9, "c": 39.3, "f": 39.4, "b": 41.5, "e": 55.8, "d": 40.1, "g": 36.7, "m": 15.0}
+    pairs = {
+        "j": "PT",
+        "k": "RU",
+        "c": "SU",
+        "f": "WX",
+        "b": "QT",
+        "e": "TW",
+        "d": "QW",
+        "g": "VX",
+        "m": "OP",
+    }
+    for leg in "012":
+        for link, (first, second) in pairs.items():
+            ends = at[first if first == "O" else first + leg], at[second + leg]
+            assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(holy[link]), link
+        assert at["Q" + leg] - at["O"] == pytest.approx([-38.0, -7.8])
+        masses = {"bde": 41.5 + 40.1 + 55.8, "ghi": 36.7 + 65.7 + 49.0, "k": 61.9}
+        assert {link: mass[link + leg] for link in masses} == pytest.approx(masses)
+
+
 @pytest.mark.parametrize(
     ("name", "fault"),
     [
