@@ -12,6 +12,8 @@ BRANCHES = "branches"
 BEST = "tuned"
 AS_IN_FILE = "as in file"  # family that runs the file from which a scene was read, at the file's own settings
 ORIGIN = ("file", "import")  # options of "as in file": path of the file, options for reading
+TOLERANCES = ("rtol", "accuracy")  # options of families with error-controlled steps
+TIMED = {"step": 1, "min_step": 1, "beta": -1}  # options with the unit s, and with 1/s
 # part of a method (such as "integrators") → name → its options with their defaults
 FamilyParts = Mapping[str, Mapping[str, Mapping[str, float]]]
 
@@ -60,3 +62,14 @@ def best_family(settings: Sequence[Setting]) -> list[Setting]:
     families = [setting.family for setting in settings]
     best = BEST if BEST in families or not families else families[0]
     return [setting for setting in settings if setting.family == best]
+
+
+def fineness(setting: Setting) -> float:
+    """Return the step (s) or the tolerance of a setting; 1 if it has neither."""
+    return float(next((setting.options[n] for n in ("step", *TOLERANCES) if n in setting.options), 1.0))
+
+
+def slowed(setting: Setting, factor: float) -> Setting:
+    """Return a setting for a motion that takes ``factor`` times as long: steps, and rates of decay."""
+    changed = {n: setting.options[n] * factor**k for n, k in TIMED.items() if n in setting.options}
+    return Setting(setting.family, {**setting.options, **changed})

@@ -25,7 +25,7 @@ from crosscheck.cli.running import (
     standard_output_kept,
     studied,
 )
-from crosscheck.cli.stored_tables import closed_loops, convergence, modes
+from crosscheck.cli.stored_tables import closed_loops, convergence, invariants, modes
 from crosscheck.study.grid import Record, key
 from crosscheck.study.progress import counted
 from crosscheck.study.provenance import made_by
@@ -173,6 +173,7 @@ COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "diagnose": _diagnose,
     "closed-loops": closed_loops,
     "convergence": convergence,
+    "invariants": invariants,
     "modes": modes,
     "report": _report,
     "paper": _paper,

@@ -33,6 +33,7 @@ from crosscheck.cli.options import (
 )
 from crosscheck.closed_loops.records import FILE
 from crosscheck.convergence.ladders import FILE as LADDERS
+from crosscheck.invariants.records import FILE as INVARIANTS
 from crosscheck.study.timings import REPEATS
 from mbref.command_line import Parser, add_output, commands, number, record_file, whole
 
@@ -76,6 +77,7 @@ def parser() -> argparse.ArgumentParser:
         add_diagnose,
         _add_closed_loops,
         _add_convergence,
+        _add_invariants,
         _add_modes,
         _add_report,
         _add_paper,
@@ -195,6 +197,15 @@ def _add_convergence(commands: Commands) -> None:
     )
     parser = add_command(commands, "convergence", about, "crosscheck convergence --run --engine drake")
     add_stored_runs(parser, LADDERS)
+
+
+def _add_invariants(commands: Commands) -> None:
+    about = (
+        "show what engines do to momenta, energy, similarity and distance from the origin, and by which law, "
+        "from stored records; --run makes the missing runs of installed engines"
+    )
+    parser = add_command(commands, "invariants", about, "crosscheck invariants --run --engine drake")
+    add_stored_runs(parser, INVARIANTS)
 
 
 def _add_modes(commands: Commands) -> None:

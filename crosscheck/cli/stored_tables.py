@@ -1,4 +1,5 @@
-"""Commands that measure engines and print stored records: closed loops, convergence, small motions."""
+"""Commands that measure engines and print stored records: closed loops, convergence, invariants, small
+motions."""
 
 from __future__ import annotations
 
@@ -20,6 +21,8 @@ from crosscheck.closed_loops import records as closed
 from crosscheck.closed_loops.matrix import LEGEND, Cell, is_run, matrix, shown
 from crosscheck.convergence import ladders, orders
 from crosscheck.engine import all_engines
+from crosscheck.invariants import laws
+from crosscheck.invariants import records as kept
 from crosscheck.small_motions import records as poses
 from crosscheck.small_motions import sentences
 from crosscheck.study.grid import Record
@@ -87,6 +90,21 @@ def _orders(runs: Sequence[Record]) -> Table:
     for row, found in orders.table(runs).items():
         table.add_row(row.name, *map(orders.cell, found.values()))
     return table
+
+
+def invariants(arguments: argparse.Namespace) -> int:
+    """Measure engines and write the page if requested, and print the tables of invariants and laws."""
+    path = Path(arguments.records)
+    if arguments.run:
+        kept.measure(request.find_engines(arguments.engine or ["all"], notice), path, notice)
+    if status := write_page("invariants", path, arguments.page):
+        return status
+    for title, found in laws.tables(kept.read(path)).items():
+        table = Table("row", *(column.heading for column in laws.COLUMNS), title=title, box=SIMPLE)
+        for name, row in found.items():
+            table.add_row(name, *(laws.cell(row, column) for column in laws.COLUMNS))
+        console().print(table)
+    return COMPLETED
 
 
 def modes(arguments: argparse.Namespace) -> int:

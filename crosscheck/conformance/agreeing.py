@@ -89,13 +89,13 @@ def _ways(bench: Bench, given: Alternatives, failures: dict[str, str]) -> dict[s
     for name, run in zip(settings, runs, strict=True):
         if run.outcome in (Outcome.COMPLETED, Outcome.CRASHED):
             whole = completed(scene, run, len(times))
-            found[name] = Way(whole, _quantities(scene, whole))
+            found[name] = Way(whole, quantities_of(scene, whole))
         else:
             failures[name] = shortened(f"{name}: {run.message or run.outcome.sentence}")
     return found
 
 
-def _quantities(scene: Scene, run: Trajectory) -> dict[str, np.ndarray]:
+def quantities_of(scene: Scene, run: Trajectory) -> dict[str, np.ndarray]:
     """Return accelerations, forces of all joints on a body, and mean accelerations since the start."""
     units = np.repeat([1.0, scene_length(scene)], 3)
     twists = units * np.concatenate([run.velocity, run.angular_velocity], axis=2)
@@ -108,12 +108,12 @@ def _quantities(scene: Scene, run: Trajectory) -> dict[str, np.ndarray]:
 
 
 def _finding(scene: Scene, within: float, ways: Mapping[str, Way]) -> Finding:
-    worst = max(_apart(scene, ways, itertools.combinations(ways, 2)))
+    worst = max(differences(scene, ways, itertools.combinations(ways, 2)))
     if worst.size <= within:
         return Finding(worst.size, within, f"{' and '.join(map(repr, worst.ways))} in {worst.quantity}")
     if off := _from_truth(scene, ways, worst.sample):
         right = min(off, key=lambda name: off[name])
-        beside = max(_apart(scene, ways, ((right, name) for name in ways if name != right)))
+        beside = max(differences(scene, ways, ((right, name) for name in ways if name != right)))
         worst = beside if beside.size > within else worst
     return Finding(worst.size, within, _sentence(worst, off))
 
@@ -129,7 +129,7 @@ def _sentence(worst: Apart, off: Mapping[str, float]) -> str:
     return f"{said}; Gauss's principle supports {near!r}, {off[near]:.1e} off, against {off[far]:.1e}"
 
 
-def _apart(scene: Scene, ways: Mapping[str, Way], pairs: Iterable[tuple[str, str]]) -> list[Apart]:
+def differences(scene: Scene, ways: Mapping[str, Way], pairs: Iterable[tuple[str, str]]) -> list[Apart]:
     """Return the largest difference of each pair in each quantity and sample."""
     least, mass = LEAST_CHANGE * acceleration_scale(scene), sum(body.mass or 0.0 for body in scene.body)
     found = []

@@ -35,7 +35,10 @@ MOST = 3
 DECIDED = (PASS, FAIL)
 NOTHING: dict[str, Any] = {"verdicts": ()}
 # checks that need other mechanisms, listed here, or scenes of the suite
-ELSEWHERE = ("momentum", "replayed", "dead end", "refined", "start", "alternatives")
+ELSEWHERE = (
+    *("momentum", "replayed", "dead end", "refined", "start", "alternatives"),
+    *("momenta", "passive", "similar", "distant"),
+)
 KINDS: tuple[tuple[Callable[[int], Scene], tuple[str, ...]], ...] = (
     (mechanism, (RUN, AGREEMENT, *(check for check in PROPERTIES if check not in ELSEWHERE))),
     (floating, ("energy", "momentum", "reversed")),

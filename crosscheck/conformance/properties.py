@@ -12,6 +12,7 @@ import numpy as np
 from crosscheck.conformance.agreeing import accelerations_at_start, alternatives_agree
 from crosscheck.conformance.changes.copies import Outside
 from crosscheck.conformance.changes.relations import RELATIONS
+from crosscheck.conformance.keeping import LAWS
 from crosscheck.conformance.precise import double_precision, refined, settled, smooth
 from crosscheck.conformance.related import related
 from crosscheck.conformance.trial import NEIGHBOURS, Bench, Finding, Specimen, difference
@@ -266,7 +267,7 @@ def _at(run: Trajectory, samples: slice | np.ndarray) -> Trajectory:
 
 
 def _every(specimen: Specimen) -> bool:
-    return not (specimen.dead_end or specimen.large)
+    return not (specimen.dead_end or specimen.large or specimen.keeps)
 
 
 def _large(specimen: Specimen) -> bool:
@@ -279,6 +280,10 @@ def _several_ways(specimen: Specimen) -> bool:
 
 def _without_joints(specimen: Specimen) -> bool:
     return not specimen.scene.joint
+
+
+def _keeps(quantity: str) -> Callable[[Specimen], bool]:
+    return lambda specimen: specimen.keeps == quantity
 
 
 def _dead_end(specimen: Specimen) -> bool:
@@ -312,6 +317,7 @@ PROPERTIES: Mapping[str, Property] = {
     "alternatives": _property(alternatives_agree, _several_ways),
     "energy": _property(energy, version=2),
     "momentum": _property(momentum),
+    **{name: _property(check, _keeps(quantity)) for name, (check, quantity) in LAWS.items()},
     "balance": _property(balanced),
     "workless": _property(workless),
     "silence": _property(silence),

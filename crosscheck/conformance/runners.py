@@ -42,6 +42,10 @@ class Runner(Protocol):
     def alternatives(self) -> Sequence[Alternatives]:
         """The engine's ways to solve the same equations."""
 
+    @property
+    def own_families(self) -> Sequence[str]:
+        """The engine's families of settings that it integrates itself."""
+
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
         """Return the version, and the reason of a refusal or the settings, of the engine or of one family of
         settings."""
@@ -55,6 +59,11 @@ class Runner(Protocol):
 
     def in_turn(self, tasks: Sequence[Task], times: np.ndarray) -> list[Trajectory]:
         """Return runs of (scene, setting) pairs that follow each other in one process."""
+
+
+def own_families(engine: Engine) -> list[str]:
+    """Return the families of settings that an engine integrates itself."""
+    return [family for family in engine.families if family not in engine.integrated_here]
 
 
 @contextlib.contextmanager
@@ -86,6 +95,11 @@ class Isolated:
     def alternatives(self) -> Sequence[Alternatives]:
         with answering():
             return engine(self.name).alternatives
+
+    @property
+    def own_families(self) -> Sequence[str]:
+        with answering():
+            return own_families(engine(self.name))
 
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
         return ask(self.name, serve.offered, (scene, family), self.time_limit)
@@ -149,6 +163,10 @@ class InProcess:
     @property
     def alternatives(self) -> Sequence[Alternatives]:
         return self.engine.alternatives
+
+    @property
+    def own_families(self) -> Sequence[str]:
+        return own_families(self.engine)
 
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
         with answering():

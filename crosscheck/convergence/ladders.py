@@ -14,6 +14,7 @@ from crosscheck.closed_loops.mechanisms import Difficulty
 from crosscheck.engine import Cannot, Owner, Setting, engine
 from crosscheck.judge.tolerances import FALSE_SUCCESS
 from crosscheck.processes.pool import end_idle
+from crosscheck.setting import TOLERANCES
 from crosscheck.study.grid import Case, Record, key, run_in_turn, study
 from crosscheck.study.record_view import ended, error, error_bound, is_completed
 from crosscheck.study.search.offers import default_cases
@@ -28,7 +29,6 @@ MOST_TIME = 120.0  # s of CPU time of a run with the compilation of its model
 HALVINGS = 16  # number of runs of a family at most
 VAIN = 2  # number of successive runs without a lower error after which finer ones are not made
 LOWER = 0.7  # of the least error so far: a method of order one halves the error with the step
-TOLERANCES = ("rtol", "accuracy")  # options of families with error-controlled steps
 
 MECHANISMS = (
     Difficulty("planar slider-crank", "A moment turns the crank.", "planar_slider_crank", 0.1),
@@ -64,7 +64,11 @@ ROWS = (
     Row("mujoco", "tuned", "MuJoCo's RK4, regulariser negligible"),
     Row("mujoco", "stock", "MuJoCo's RK4, stiffest documented closures"),
     Row("mujoco", "euler", "MuJoCo's semi-implicit Euler, default closures"),
+    Row("mujoco", "discrete", "MuJoCo's integrator discrete, stiffest documented closures"),
     Row("pinocchio", "baumgarte", "RK4 with Pinocchio's Baumgarte terms"),
+    Row("pinocchio", "lcaba", "RK4 with the loop-constrained articulated body algorithm"),
+    Row("pinocchio", "admm", "RK4 with the anchors of Pinocchio 4 and its ADMM, Baumgarte terms"),
+    Row("pinocchio", "pgs", "RK4 with the anchors of Pinocchio 4 and its PGS, Baumgarte terms"),
     Row("pinocchio", "tuned", "DOP853 (order 8) with projection, tolerance"),
     Row("exudyn", "alpha", "generalised alpha (order 2)"),
     Row("exudyn", "tuned", "trapezoidal rule, extrapolated"),

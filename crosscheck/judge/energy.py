@@ -28,11 +28,17 @@ def energy_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
     too far apart to count a body's turns, or if all energies are at rounding level. The drift is infinite if
     a state is not finite.
     """
+    gain = energy_gain(scene, trajectory)
+    return None if gain is None else np.abs(gain)
+
+
+def energy_gain(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
+    """Return `energy_series` (k,) with its sign: positive where the run has gained energy."""
     balance = _balance(scene, trajectory)
     if balance is None:
         return None
-    drift, scale = balance
-    return None if scale <= AT_REST * _possible(scene, trajectory) else drift / scale
+    gain, scale = balance
+    return None if scale <= AT_REST * _possible(scene, trajectory) else gain / scale
 
 
 def energy_drift(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
@@ -41,11 +47,11 @@ def energy_drift(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
     The result is None or infinite as in `energy_series`, but a number if all energies are at rounding level.
     """
     balance = _balance(scene, trajectory)
-    return None if balance is None else balance[0]
+    return None if balance is None else np.abs(balance[0])
 
 
 def _balance(scene: Scene, trajectory: Trajectory) -> tuple[np.ndarray, float] | None:
-    """Return the drift (k,) in J, and the largest energy of the motion (J); None if there is no energy
+    """Return the gain (k,) in J, and the largest energy of the motion (J); None if there is no energy
     balance."""
     works = any(load.is_damped or load.over_time for load in scene.load)
     if scene.driver or works or not scene.has_mass() or not len(trajectory.times):
@@ -56,7 +62,7 @@ def _balance(scene: Scene, trajectory: Trajectory) -> tuple[np.ndarray, float] |
     start = kinetic_energy(scene, *(a[None] for a in _initial(scene)))[0]
     gains = np.array([kinetic - start, *_potential_gains(scene, trajectory)])
     scale = max(start, kinetic.max(), np.abs(gains).max())
-    return None if np.isnan(gains).any() else (np.abs(gains.sum(axis=0)), float(scale))
+    return None if np.isnan(gains).any() else (gains.sum(axis=0), float(scale))
 
 
 def _possible(scene: Scene, trajectory: Trajectory) -> float:

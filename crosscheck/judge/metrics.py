@@ -267,9 +267,11 @@ METRICS: dict[str, Metric] = {
 }
 
 
-def order_of_convergence(steps: Sequence[float], errors: Sequence[float]) -> float | None:
+def order_of_convergence(
+    steps: Sequence[float], errors: Sequence[float], least: float = LEAST_ORDER
+) -> float | None:
     """Return the slope of log error over log step in the longest range of at least three neighbouring steps
-    that is nearly straight.
+    that is nearly straight and has a slope above ``least``.
 
     None if no such range exists, for example at the rounding level.
     """
@@ -280,7 +282,7 @@ def order_of_convergence(steps: Sequence[float], errors: Sequence[float]) -> flo
         for j in range(i + 3, len(x) + 1):
             slope, level = np.polyfit(x[i:j], y[i:j], 1)
             scatter = np.sqrt(np.mean((slope * x[i:j] + level - y[i:j]) ** 2))
-            if scatter <= STRAIGHT_LINE and slope > LEAST_ORDER:
+            if scatter <= STRAIGHT_LINE and slope > least:
                 best = max(best or (0, 0.0), (j - i, float(slope)))
     return None if best is None else best[1]
 

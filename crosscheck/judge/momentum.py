@@ -19,11 +19,18 @@ from mbref.scene import GROUND, Force, Moment, Scene
 
 
 def momentum_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
-    """Return the drift (k,) since t = 0 of the momentum minus the impulse of gravity and loads, over Σ m |v|.
+    """Return the larger one of both drifts (k,) of `momentum_drifts`; None where they are not known."""
+    drifts = momentum_drifts(scene, trajectory)
+    return None if drifts is None else np.maximum(*drifts)
 
-    The drift of the angular momentum, over Σ m |v| times the scene's length plus Σ |J ω|, is returned if it
-    is larger than the drift of the momentum. None if a joint or a spring is fixed to the ground, if a force
-    or moment changes with time, without masses, or if nothing moves.
+
+def momentum_drifts(scene: Scene, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the drifts (k,) since t = 0 of momentum and angular momentum minus the impulse of gravity and
+    loads.
+
+    The drift of the momentum is relative to Σ m |v|, and the drift of the angular momentum relative to
+    Σ m |v| times the scene's length plus Σ |J ω|. None if a joint or a spring is fixed to the ground, if a
+    force or moment changes with time, without masses, or if nothing moves.
     """
     if not scene.has_mass() or any(GROUND in item.bodies for item in _links(scene)):
         return None
@@ -41,8 +48,7 @@ def momentum_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
     if any(isinstance(load, Force) for load in scene.load):
         angular = 0 * angular  # the moment of a force changes as its point of attack moves
     by_length = turning + along * constraints.scene_length(scene)
-    drifts = np.linalg.norm(linear, axis=1) / (along or np.inf), np.linalg.norm(angular, axis=1) / by_length
-    return np.maximum(*drifts)
+    return np.linalg.norm(linear, axis=1) / (along or np.inf), np.linalg.norm(angular, axis=1) / by_length
 
 
 def _links(scene: Scene) -> list[Any]:

@@ -15,7 +15,10 @@ from mbref.files import write
 
 from ..markdown import body
 
-NAMES = ("which-engine", "closed-loops", "convergence", "small-motions", "files", "findings", "support")
+NAMES = (
+    *("which-engine", "closed-loops", "convergence", "invariants", "small-motions", "files"),
+    *("findings", "support"),
+)
 TEMPLATES = Path(__file__).parents[1] / "templates"  # texts of the pages, with names of parts in braces
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 

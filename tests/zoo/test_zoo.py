@@ -2,6 +2,7 @@
 
 import functools
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,12 @@ from crosscheck.conformance.runners import InProcess
 from tests.zoo.defects import DEFECTS, engine
 from tests.zoo.table import FOR_REPORTS, data, page
 
+ON_ONE_BODY = {
+    "momenta": "tumbling body",
+    "passive": "pendulum",
+    "similar": "pendulum",
+    "distant": "pendulum",
+}
 SPECIMENS = {s.scene.name: s for s in [Specimen(undetermined()), *specimens()]}
 
 
@@ -40,6 +47,16 @@ def test_planted_defect_fails_its_check_which_the_sound_engine_passes(about):
     assert faulty.status == suite.FAIL, f"{about}: {defect.check} on {defect.scene} says {faulty}"
     assert faulty.property == defect.check
     assert sound.status == suite.PASS, f"the sound engine: {sound}"
+
+
+@pytest.mark.parametrize(("check", "scene"), ON_ONE_BODY.items())
+def test_a_law_that_a_defect_breaks_fails_on_one_body_too(check, scene):
+    """The gate's case of the defects of laws, whose scenes have several bodies."""
+    specimen = replace(SPECIMENS[scene], keeps="all")
+    defect = next(defect for defect in DEFECTS.values() if defect.check == check)
+    for planted, status in ((defect, suite.FAIL), (None, suite.PASS)):
+        found = suite.verdict_on(check, trial.set_up(InProcess(engine(planted)), specimen))
+        assert found.status == status, found
 
 
 def test_every_check_has_a_defect_that_it_detects():

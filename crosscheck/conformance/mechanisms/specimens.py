@@ -7,6 +7,7 @@ from functools import cache
 
 from crosscheck.conformance.mechanisms.closed_forms import CLOSED_FORMS, GEARED, Exact
 from crosscheck.conformance.mechanisms.features import feature_scenes
+from crosscheck.conformance.mechanisms.invariant import flying_ring, whirling_crank
 from crosscheck.conformance.mechanisms.large_graphs import large_graph
 from crosscheck.conformance.mechanisms.moving import dead_end, moving_probes
 from crosscheck.conformance.mechanisms.random_scenes import mechanism
@@ -34,7 +35,8 @@ class Specimen:
     """A scene of the suite. ``exact`` returns its poses if a formula is known. ``related`` applies the
     metamorphic relations. ``reference_time`` is the CPU time (s) of a reference if no closed form exists. A
     ``dead_end`` has drivers that the mechanism cannot follow to the end. A ``large`` mechanism is judged by
-    accelerations at the start."""
+    accelerations at the start. ``keeps`` is the quantity that each of the engine's ways keeps on it: momenta
+    or energy."""
 
     scene: Scene
     exact: Exact | None = None
@@ -42,6 +44,7 @@ class Specimen:
     reference_time: float = SECONDS
     dead_end: bool = False
     large: bool = False
+    keeps: str = ""
 
 
 @cache
@@ -55,4 +58,5 @@ def specimens(deep: bool = False) -> tuple[Specimen, ...]:
     forms += [Specimen(scene, None, deep or scene.name in RELATED) for scene in scenes]
     geared = (Specimen(*make()) for make in GEARED)
     graphs = (Specimen(large_graph(seed), large=True) for seed in GRAPHS)
-    return (*forms, *geared, Specimen(dead_end(), dead_end=True), *graphs)
+    invariant = (Specimen(flying_ring(40.0), keeps="momenta"), Specimen(whirling_crank(), keeps="energy"))
+    return (*forms, *geared, Specimen(dead_end(), dead_end=True), *graphs, *invariant)

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Owner, Setting
+from crosscheck.engine import Alternatives, Cannot, Owner, Setting
 from crosscheck.engines.casadi.library import library, why_not
 from crosscheck.engines.shared.driver_motion import stated_rate
 from crosscheck.engines.shared.sampling import Failed
@@ -32,6 +32,8 @@ OPTIONS = {
     "beta": "decay rate of the closure errors, a double root (1/s)",
 }
 RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
+EXACT = {"rtol": 1e-11, "min_step": 1e-6}
+WAYS = {PROJECTED: Setting(PROJECTED, EXACT), PLAIN: Setting(PLAIN, {**EXACT, "beta": 0.1})}
 ENDS = {  # status: outcome and sentence
     1: (Outcome.NOT_FINITE, "the motion is not finite after {t:.6g} s"),
     2: (Outcome.STEP_FAILED, "no step after {t:.6g} s is short enough for the tolerance"),
@@ -48,6 +50,7 @@ class CasADi(Generator):
 
     name = package = "casadi"
     families, options, integrated_here = FAMILIES, OPTIONS, tuple(FAMILIES)
+    alternatives = (Alternatives(WAYS, 1e-8),)
 
     def refuses(self, scene: Scene) -> Cannot | None:
         """Refuse what the equations refuse, and every scene without a C compiler."""

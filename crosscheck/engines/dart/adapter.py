@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engine import Setting
+from crosscheck.engine import Alternatives, Setting
 from crosscheck.engines.dart.model import Mechanism
 from crosscheck.engines.shared import terms
 from crosscheck.engines.shared.driver_motion import motion
@@ -29,9 +29,20 @@ FAMILIES = {
     BALLS: "DART's step; cut hinges closed by ball constraints, half of a closure error removed in each "
     "step; nothing falls asleep",
 }
-OPTIONS = STEP | {"erp": "fraction of a closure error that a step removes"} | terms.OPTIONS
+OPTIONS = (
+    STEP
+    | terms.OPTIONS
+    | {
+        "erp": "fraction of a closure error that a step removes",
+        "solver": "boxed solver of the linear complementarity problem: Dantzig, or PGS of many iterations",
+    }
+)
 OWN_STEPS = {DEFAULTS: {"erp": 0.01}, BALLS: {"erp": 0.5}}
 DEFAULT_STEPS = {DEFAULTS: 1e-3}
+SOLVERS = ("Dantzig", "PGS")
+WAY = {"step": 1e-3, "erp": 0.5}
+MOST_ITERATIONS, UNCHANGED = 50_000, 1e-10  # of PGS: iterations, and change of an impulse at which it ends
+SAME = 1e-5  # largest difference of the solvers' mean accelerations, where PGS converges slowly
 
 
 JOINT_DEFAULTS = (
@@ -55,6 +66,9 @@ class Dart(SteppingEngine):
         *(f"dartpy.simulation.World().{name}()" for name in ("getTimeStep", "getGravity")),
         *(f"dartpy.constraint.JointConstraint.get{name}()" for name in JOINT_DEFAULTS),
     )
+    alternatives = (
+        Alternatives({solver: Setting(BALLS, WAY | {"solver": solver}) for solver in SOLVERS}, SAME),
+    )
     finer = 2  # the method is of first order
     scout, planar = DEFAULTS, (BALLS,)
 
@@ -67,7 +81,10 @@ class Dart(SteppingEngine):
     def world(self, scene: Scene, setting: Setting) -> World:
         """Return DART's world of a scene."""
         mechanism = Mechanism(scene, spanning_tree(scene, CLOSES))
-        return _World(mechanism, setting.family == BALLS, setting.options["erp"])
+        world = _World(mechanism, setting.family == BALLS, setting.options["erp"])
+        if setting.options.get("solver", SOLVERS[0]) == "PGS":
+            world.use_pgs()
+        return world
 
 
 class _World(World):
@@ -90,6 +107,20 @@ class _World(World):
         for joint, driver in self.driven:
             joint.setActuatorType(dart.dynamics.ActuatorType.ACCELERATION)
             joint.setVelocity(0, motion(driver, 0.0)[1])
+
+    def use_pgs(self) -> None:
+        """Replace Dantzig's method by the projected Gauss-Seidel method, iterated to convergence."""
+        solver, options = (
+            self.world.getConstraintSolver(),
+            self.mechanism.dart.constraint.PgsBoxedLcpSolverOption(),
+        )
+        options.mMaxIteration = MOST_ITERATIONS
+        options.mDeltaXThreshold = options.mRelativeDeltaXTolerance = UNCHANGED
+        dantzig, pgs = solver.getBoxedLcpSolver(), solver.getSecondaryBoxedLcpSolver()
+        pgs.setOption(options)
+        solver.setSecondaryBoxedLcpSolver(None)  # a solver cannot be both
+        solver.setBoxedLcpSolver(pgs)
+        solver.setSecondaryBoxedLcpSolver(dantzig)  # DART sets impulses to zero where no solver converges
 
     def begin(self, h: float) -> None:
         self.world.setTimeStep(h)

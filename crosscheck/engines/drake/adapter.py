@@ -12,13 +12,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from crosscheck.engine import Setting
+from crosscheck.engine import Alternatives, Setting
 from crosscheck.engines.drake.model import Mechanism
 from crosscheck.engines.shared import terms
 from crosscheck.engines.shared.everything import EVERYTHING
 from crosscheck.engines.shared.own_steps import STEP, SteppingEngine, World
 from crosscheck.engines.shared.sampling import Failed
-from crosscheck.engines.shared.spanning_tree import spanning_tree
+from crosscheck.engines.shared.spanning_tree import Tree, spanning_tree
 from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
 
@@ -29,6 +29,10 @@ FAMILIES = {
     DISCRETE: "Drake's discrete plant and SAP solver; cut hinges closed by ball constraints, all other "
     "cut joints by welds of the two parts of a split body",
 }
+# approximations of contact, of which only the solver matters here; TAMSI has no constraints
+CONTACTS = ("SAP", "Similar", "Lagged")
+OPTIONS = STEP | terms.OPTIONS | {"contact": f"approximation of contact: {', '.join(CONTACTS)}"}
+WAYS = {name: Setting(DISCRETE, {"step": 1e-3, "contact": name}) for name in CONTACTS}
 OWN_STEPS: dict[str, dict[str, float]] = {DISCRETE: {}}
 
 
@@ -39,7 +43,8 @@ class Drake(SteppingEngine):
     package = "drake"
     modules = ("pydrake.multibody.plant", "pydrake.multibody.tree")
     supports = EVERYTHING
-    families, own_steps, options = FAMILIES, OWN_STEPS, STEP | terms.OPTIONS
+    families, own_steps, options = FAMILIES, OWN_STEPS, OPTIONS
+    alternatives = (Alternatives(WAYS, 1e-9),)
     integrated_here, with_terms = (terms.FAMILY,), Mechanism
     finer = 1  # the method is of first order
     scout, planar = DISCRETE, (DISCRETE,)
@@ -51,20 +56,22 @@ class Drake(SteppingEngine):
     def world(self, scene: Scene, setting: Setting) -> World:
         """Return the discrete plant of a scene."""
         tree = spanning_tree(scene, CLOSES, between_links=True)
-        return _Plant(Mechanism(scene, tree, setting.options["step"]))
+        return _Plant(scene, tree, setting)
 
 
 class _Plant(World):
     """Discrete plants, one for each length of step, which is fixed when a plant is made."""
 
-    def __init__(self, mechanism: Mechanism):
-        self.plants = {_digits(mechanism.plant.time_step()): mechanism}
+    def __init__(self, scene: Scene, tree: Tree, setting: Setting):
+        self.contact = str(setting.options.get("contact", ""))
+        step = _digits(setting.options["step"])
+        self.plants = {step: Mechanism(scene, tree, step, self.contact)}
         self.acting: Sequence[tuple[int, np.ndarray, np.ndarray]] | None = None  # loads of the last step
-        super().__init__(mechanism)
+        super().__init__(self.plants[step])
 
     def begin(self, h: float) -> None:
         if (key := _digits(h)) not in self.plants:
-            self.plants[key] = Mechanism(self.scene, self.tree, key)
+            self.plants[key] = Mechanism(self.scene, self.tree, key, self.contact)
         now, self.mechanism = self.mechanism, self.plants[key]
         self.mechanism.context.SetDiscreteState(now.context.get_discrete_state().Clone())
         self.acting = None

@@ -31,7 +31,7 @@ class Mechanism:
     With a ``time_step`` of 0 the plant is continuous and has no closures.
     """
 
-    def __init__(self, scene: Scene, tree: Tree, time_step: float = 0.0):
+    def __init__(self, scene: Scene, tree: Tree, time_step: float = 0.0, contact: str = ""):
         from pydrake import math
         from pydrake.multibody import plant
         from pydrake.multibody import tree as parts
@@ -39,6 +39,9 @@ class Mechanism:
         self.math, self.parts, self.scene, self.tree = math, parts, scene, tree
         self.coordinates = joint_coordinates(tree, in_child=False)
         self.plant = plant.MultibodyPlant(time_step)
+        if contact:
+            kinds = plant.DiscreteContactApproximation
+            self.plant.set_discrete_contact_approximation(getattr(kinds, f"k{contact.capitalize()}"))
         if time_step:
             self.plant.SetUseSampledOutputPorts(False)  # so that an update computes discrete states only
         self.plant.mutable_gravity_field().set_gravity_vector(scene.gravity)

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engine import Setting
+from crosscheck.engine import Alternatives, Setting
 from crosscheck.engines.shared import file_cache
 from crosscheck.engines.shared.sampling import Failed
 from crosscheck.engines.shared.symbolic.generator import RTOL, Generator, equations_of, origin, sweep
@@ -30,6 +30,10 @@ FAMILY = "taylor"
 FAMILIES = {FAMILY: "Taylor series of the order that heyoka chooses, without stabilisation of closures"}
 RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12)
 MOST_STEPS = 10**6
+# generated code: its name, and heyoka's options that make it
+CODES = {"unrolled": {}, "compact": {"compact_mode": True}, "high accuracy": {"high_accuracy": True}}
+OPTIONS = RTOL | {"code": f"generated code: {', '.join(CODES)}"}
+WAYS = {name: Setting(FAMILY, {"rtol": 1e-12, "code": name}) for name in CODES}
 
 
 class Heyoka(Generator):
@@ -37,7 +41,7 @@ class Heyoka(Generator):
 
     name = package = "heyoka"
     modules = ("heyoka",)
-    families, options = FAMILIES, RTOL
+    families, options, alternatives = FAMILIES, OPTIONS, (Alternatives(WAYS, 1e-9),)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
         """Return the settings of the one family, by tolerance."""
@@ -47,7 +51,7 @@ class Heyoka(Generator):
         """Simulate a scene; raises ValueError for an unknown family."""
         self._known(setting)
         began, equations = time.process_time(), equations_of(scene)
-        integrator = _integrator(scene, setting.options["rtol"])
+        integrator = _integrator(scene, setting.options["rtol"], setting.options.get("code", "unrolled"))
         integrator.time, integrator.state[:] = 0.0, equations.start
         built, began = time.process_time() - began, time.process_time()
         states, ending, steps = _propagated(integrator, times, equations.start)
@@ -71,12 +75,14 @@ def _propagated(integrator: Any, times: np.ndarray, start: np.ndarray) -> tuple[
 
 
 @functools.lru_cache(maxsize=16)
-def _integrator(scene: Scene, rtol: float) -> Any:
+def _integrator(scene: Scene, rtol: float, code: str) -> Any:
     """Return the compiled integrator of a scene, from the cache or compiled now."""
     import heyoka
 
-    made_of = origin(scene, repr(rtol), heyoka.__version__, platform.node(), Path(__file__).read_text())
-    path = file_cache.made_once(FOLDER, made_of, ".pickle", lambda target: _write(target, _made(scene, rtol)))
+    made_of = origin(scene, repr(rtol), code, heyoka.__version__, platform.node(), Path(__file__).read_text())
+    path = file_cache.made_once(
+        FOLDER, made_of, ".pickle", lambda target: _write(target, _made(scene, rtol, code))
+    )
     return pickle.loads(path.read_bytes())
 
 
@@ -84,7 +90,7 @@ def _write(target: Path, integrator: Any) -> None:
     target.write_bytes(pickle.dumps(integrator))
 
 
-def _made(scene: Scene, rtol: float) -> Any:
+def _made(scene: Scene, rtol: float, code: str) -> Any:
     import heyoka
 
     equations, arithmetic = equations_of(scene), symbolic(heyoka.sin, heyoka.cos)
@@ -93,7 +99,9 @@ def _made(scene: Scene, rtol: float) -> Any:
     q, v = y[: equations.n], y[equations.n :]
     accelerations = bare(equations.accelerations(q, v, arithmetic, 0.0))
     rates = [*symbols[equations.n :], *map(heyoka.expression, accelerations)]
-    return heyoka.taylor_adaptive(list(zip(symbols, rates, strict=True)), list(equations.start), tol=rtol)
+    return heyoka.taylor_adaptive(
+        list(zip(symbols, rates, strict=True)), list(equations.start), tol=rtol, **CODES[code]
+    )
 
 
 ENGINE = Heyoka()

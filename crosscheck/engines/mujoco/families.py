@@ -23,6 +23,7 @@ STOCK = {
     "euler": "mjINT_EULER",
     "implicit": "mjINT_IMPLICIT",
     "implicitfast": "mjINT_IMPLICITFAST",
+    "discrete": "mjINT_DISCRETE",
 }
 # decay rate of the closure errors in fastest rates of the scene, a double root; large enough to cross
 # singular positions
@@ -50,6 +51,7 @@ FAMILIES = {
     "euler": "like stock, first-order integrator Euler",
     "implicit": "like stock, first-order integrator implicit",
     "implicitfast": "like stock, first-order integrator implicitfast; only where a load damps",
+    "discrete": "like stock, first-order integrator discrete, which MuJoCo has since 3.13",
     "tuned": "the regulariser made negligible through invweight0, critically damped closures at five "
     "times the "
     f"fastest rate of the scene, RK4, Newton's method iterated to convergence; {DENSE}",
@@ -76,7 +78,8 @@ OPTIONS = SOLVERS | {
     "min_step": "shortest step, s",
     "beta": "decay rate of the closure errors, a double root, 1/s",
     "hard": "factor on the regulariser",
-    "tolerance": "closure error at which Newton's method stops, m or rad",
+    "tolerance": "at which an iteration stops: closure error, m or rad, of the family newton; scaled gain of "
+    "MuJoCo's solvers",
     "turn": "rad a driver may move within one step",
 }
 # impedance parameters; MuJoCo clamps the first two at this value
@@ -140,9 +143,12 @@ def _rounded(number: float) -> float:
 
 
 def _stock(scene: Scene) -> list[str]:
-    """Return the families with default closures whose integrators differ on the scene."""
+    """Return the families with default closures whose integrators MuJoCo has and differ on the scene."""
+    import mujoco
+
     is_damped = any(load.is_damped for load in scene.load)
-    return [family for family in STOCK if is_damped or family != "implicitfast"]
+    known = [family for family, name in STOCK.items() if hasattr(mujoco.mjtIntegrator, name)]
+    return [family for family in known if is_damped or family != "implicitfast"]
 
 
 def own_code(setting: Setting) -> str:
@@ -169,7 +175,8 @@ def own_code(setting: Setting) -> str:
     return f"{_option(attributes, flags)}{_closures(-(beta**2), -2 * beta)} and in Python: {hardened}"
 
 
-NAMES = {"EULER": "Euler", "IMPLICIT": "implicit", "IMPLICITFAST": "implicitfast"}  # names in MJCF
+IN_MJCF = ("Euler", "implicit", "implicitfast", "discrete")
+NAMES = {name.upper(): name for name in IN_MJCF}
 
 
 def _option(attributes: Mapping[str, str], flags: Mapping[str, str]) -> str:

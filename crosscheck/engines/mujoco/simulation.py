@@ -104,7 +104,7 @@ class Simulation:
         """Set the solver, Jacobian, islands and warm start that the options name."""
         if "hard" in options:
             self._harden(options["beta"], options["hard"])
-        self.model.opt.tolerance = CONVERGED
+        self.model.opt.tolerance = float(options.get("tolerance", CONVERGED))
         bits = self.mujoco.mjtDisableBit
         for name, bit in (("islands", bits.mjDSBL_ISLAND), ("warm", bits.mjDSBL_WARMSTART)):
             if not options.get(name, True):

@@ -15,7 +15,11 @@ STEPS = (0.2, 0.06, 0.02, 0.006, 0.002)  # rad turned per fixed step, for each s
 # rad turned per step, for the stabilised family only; in the others closure errors dominate
 FINEST = 0.0007
 CHOSEN = "chosen"
-FIXED = ("defaults", "proximal", "baumgarte")
+LCABA, TYPICAL_MU = "lcaba", 1e-6  # the value of mu that its documentation calls typical
+ADMM, PGS = "admm", "pgs"
+ANCHORED = (ADMM, PGS)
+PROXIMAL = ("defaults", "proximal", "baumgarte")  # families of constraintDynamics with fixed steps
+FIXED = (*PROXIMAL, LCABA, *ANCHORED)
 DOP853_COMPILED, TUNED_COMPILED = "dop853, compiled", "tuned, compiled"
 COMPILED = (DOP853_COMPILED, TUNED_COMPILED)
 COMPILED_RTOLS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
@@ -23,13 +27,16 @@ FAMILIES = {
     "defaults": "the constraint solver with its default settings (no regularisation, one iteration), RK4",
     "proximal": "the solver iterated to convergence, which redundant closures need, RK4",
     "baumgarte": "RK4 with the closures' own Baumgarte terms, double root 0.1/step",
+    LCABA: f"RK4 with the loop-constrained articulated body algorithm, mu {TYPICAL_MU:g}",
+    ADMM: "RK4 with the point and frame anchors of Pinocchio 4, solved by its ADMM, and Baumgarte terms, "
+    "double root 0.1/step",
+    PGS: "like admm, solved by its projected Gauss-Seidel",
     "dop853": "DOP853 without stabilisation",
     "tuned": "DOP853, every accepted state projected onto the closures",
     DOP853_COMPILED: "like dop853, without Python: constraintDynamics of its C++ library called by a "
     "compiled DOP853; needs a C++ compiler and the package cmeel-eigen",
     TUNED_COMPILED: "like tuned, without Python; needs a C++ compiler and cmeel-eigen",
-    CHOSEN: "like proximal with the solver's parameters mu and iterations, or with the new constraint models "
-    "of Pinocchio 4, solved here",
+    CHOSEN: "like proximal with the solver's parameters mu and iterations, or with another solver",
 }
 # change of the forces (N), mu, iterations: needed for accelerations near singular positions
 CONVERGED = 1e-9, 1e-8, 50
@@ -40,17 +47,20 @@ OPTIONS = {
     "beta": "decay rate of the closure errors, a double root, 1/s",
     "mu": "proximal parameter of the constraint solver",
     "iterations": "largest number of its iterations",
-    "models": "constraint models: legacy or new",
+    "solver": "constraintDynamics, lcaba, or ADMM, PGS or least squares for the anchors of Pinocchio 4",
 }
 # with a larger mu the iteration ends early where rows are nearly dependent
-LEGACY = {"step": 5e-4, "mu": CONVERGED[1], "iterations": 200, "models": "legacy"}
+DYNAMICS = {"step": 5e-4, "mu": CONVERGED[1], "iterations": 200, "solver": "constraintDynamics"}
 ALTERNATIVES = (
     Alternatives(
         {
-            "constraintDynamics, mu 1e-8": Setting(CHOSEN, LEGACY),
-            "constraintDynamics, mu 1e-6": Setting(CHOSEN, {**LEGACY, "mu": 1e-6}),
-            "constraintDynamics, mu 1e-10": Setting(CHOSEN, {**LEGACY, "mu": 1e-10}),
-            "new constraint models": Setting(CHOSEN, {**LEGACY, "models": "new"}),
+            "constraintDynamics, mu 1e-8": Setting(CHOSEN, DYNAMICS),
+            "constraintDynamics, mu 1e-6": Setting(CHOSEN, {**DYNAMICS, "mu": 1e-6}),
+            "constraintDynamics, mu 1e-10": Setting(CHOSEN, {**DYNAMICS, "mu": 1e-10}),
+            "lcaba, mu 1e-6": Setting(CHOSEN, {**DYNAMICS, "mu": 1e-6, "solver": LCABA}),
+            "anchors, least squares": Setting(CHOSEN, {**DYNAMICS, "solver": "least squares"}),
+            "anchors, ADMM": Setting(CHOSEN, {**DYNAMICS, "solver": "ADMM"}),
+            "anchors, PGS": Setting(CHOSEN, {**DYNAMICS, "solver": "PGS"}),
         },
         1e-5,  # forces of redundant closures have rounding of 1e-16 / mu
     ),
@@ -66,7 +76,7 @@ def sweep(scene: Scene, rate: float) -> list[Setting]:
     fixed = [
         Setting(family, {"step": h})
         for family in FIXED
-        for h in turning(scene, rate, (*STEPS, FINEST) if family == "baumgarte" else STEPS)
+        for h in turning(scene, rate, (*STEPS, FINEST) if family in ("baumgarte", *ANCHORED) else STEPS)
     ]
     least = float(f"{LEAST_TURN / rate:.2g}")
     adaptive = [{"rtol": r, "min_step": least} for r in RTOLS]
@@ -86,7 +96,7 @@ def _compiled(least: float) -> list[Setting]:
 
 def own_code(setting: Setting) -> str:
     """Return the settings of constraintDynamics in steps h of RK4, and the closures' Baumgarte terms."""
-    if setting.family not in FIXED or "step" not in setting.options:
+    if setting.family not in PROXIMAL or "step" not in setting.options:
         return ""
     step = float(setting.options["step"])
     given = () if setting.family == "defaults" else CONVERGED

@@ -1,25 +1,38 @@
-"""Closures by the constraint models that Pinocchio has since version 4, solved by least squares here.
+"""Closures by the constraint models that Pinocchio has since version 4: point and frame anchors.
 
-M a = M a₀ + Jᵀ f and J a = -J̇ v, with the Jacobian J of the models, J̇ v by central differences of J v along
-the motion, and the accelerations a₀ without closures.
+M a = M a₀ + Jᵀ f and J a + J̇ v = -2 β J v - β² Φ, with the Jacobian J, the bias J̇ v and the errors J v and
+Φ of the models, and the accelerations a₀ without closures. So G f + g = 0 with G = J M⁻¹ Jᵀ. Pinocchio's
+ADMM or PGS solves for f, or least squares here.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 REDUNDANT = 1e-12  # singular value / largest singular value; smaller values belong to redundant rows
-NUDGE = 1e-4  # s; differences of order four then are off by rounding over this time
-WEIGHTS = {-2: 1 / 12, -1: -2 / 3, 1: 2 / 3, 2: -1 / 12}
+# tolerances of ADMM and PGS, in m/s² and of the largest value, and most iterations
+SOLVED, ITERATIONS = 1e-10, 10_000
+TOLERANCES = (
+    "absolute_feasibility_tol",
+    "relative_feasibility_tol",
+    "absolute_complementarity_tol",
+    "relative_complementarity_tol",
+)
+LEAST = "least squares"
+Solver = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 class NewModels:
-    """Point and frame anchors in the place of legacy closures; ``forces`` act in the first frames."""
+    """Point and frame anchors in the place of legacy closures; ``forces`` act in the first frames.
 
-    def __init__(self, pin: Any, model: Any, closures: Any):
-        self.pin, self.model = pin, model
+    ``solver`` is ADMM, PGS or least squares, ``beta`` the decay rate of the closure errors (1/s).
+    """
+
+    def __init__(self, pin: Any, model: Any, closures: Any, solver: str, beta: float = 0.0):
+        self.pin, self.model, self.beta = pin, model, beta
         self.data, self.free = model.createData(), model.createData()
         self.models = pin.StdVec_ConstraintModel()
         for closure in closures:
@@ -32,6 +45,7 @@ class NewModels:
         self.datas = pin.StdVec_ConstraintData()
         self.datas.extend([constraint.createData() for constraint in self.models])
         self.forces: list[np.ndarray] = []
+        self.solved: Solver = _least if solver == LEAST else self._by(solver)
 
     def accelerations(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
         """Return joint accelerations (nv,), and keep the forces of the closures."""
@@ -40,20 +54,54 @@ class NewModels:
             return free
         rows, mass = self._jacobian(q), self.pin.crba(self.model, self.data, q)
         mass = np.triu(mass) + np.triu(mass, 1).T
-        drift = sum(w * self._jacobian(self._moved(q, k * NUDGE * v)) @ v for k, w in WEIGHTS.items()) / NUDGE
         spread = np.linalg.solve(mass, rows.T)
-        pushes = np.linalg.lstsq(rows @ spread, -rows @ free - drift, rcond=REDUNDANT)[0]
+        pushes = self.solved(rows @ spread, rows @ free + self._bias(q, v))
         self.forces = np.split(-pushes, np.cumsum(self.sizes)[:-1])
         found: np.ndarray = free + spread @ pushes
         return found
 
-    def _moved(self, q: np.ndarray, way: np.ndarray) -> np.ndarray:
-        return self.pin.integrate(self.model, q, way)
+    def _calc(self) -> None:
+        for constraint, data in zip(self.models, self.datas, strict=True):
+            constraint.calc(self.model, self.data, data)
 
     def _jacobian(self, q: np.ndarray) -> np.ndarray:
         """Return the Jacobian (rows, nv) of all closures at a configuration."""
         self.pin.computeJointJacobians(self.model, self.data, q)
-        for constraint, data in zip(self.models, self.datas, strict=True):
-            constraint.calc(self.model, self.data, data)
+        self._calc()
         rows: np.ndarray = self.pin.getConstraintsJacobian(self.model, self.data, self.models, self.datas)
         return rows.copy()
+
+    def _bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Return J̇ v + 2 β J v + β² Φ (rows,), from the errors that the models have without acceleration."""
+        self.pin.forwardKinematics(self.model, self.data, q, v, 0 * v)
+        self._calc()
+        found = []
+        for data in (data.extract() for data in self.datas):
+            feedback = 2 * self.beta * data.constraint_velocity_error
+            feedback = feedback + self.beta**2 * data.constraint_position_error
+            found.append(data.constraint_acceleration_error + feedback)
+        return np.concatenate(found)
+
+    def _by(self, name: str) -> Solver:
+        """Return ADMM or PGS as a function that solves G f + g = 0; raises ValueError for another name."""
+        if name not in ("ADMM", "PGS"):
+            raise ValueError(f"solver {name!r}: the anchors' solvers are ADMM, PGS and {LEAST}")
+        solver = getattr(self.pin, f"{name}ConstraintSolver")(sum(self.sizes))
+        settings = getattr(self.pin, f"{name}SolverSettings")()
+        settings.max_iterations = ITERATIONS
+        for tolerance in TOLERANCES:
+            setattr(settings, tolerance, SOLVED)
+
+        def solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+            result = getattr(self.pin, f"{name}SolverResult")()
+            delassus = self.pin.DelassusOperatorDense(matrix)
+            solver.solve(delassus, right, self.models, self.datas, settings, result)
+            found: np.ndarray = result.retrieveConstraintImpulses().copy()
+            return found if result.converged else np.full_like(found, np.nan)
+
+        return solved
+
+
+def _least(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    found: np.ndarray = np.linalg.lstsq(matrix, -right, rcond=REDUNDANT)[0]
+    return found

@@ -12,7 +12,16 @@ from scipy.linalg import solve_triangular
 
 from crosscheck.engine import Setting
 from crosscheck.engines.pinocchio import compiled_run
-from crosscheck.engines.pinocchio.families import BAUMGARTE, CHOSEN, CONVERGED, FIXED, TUNED_COMPILED
+from crosscheck.engines.pinocchio.families import (
+    ANCHORED,
+    BAUMGARTE,
+    CHOSEN,
+    CONVERGED,
+    FIXED,
+    LCABA,
+    TUNED_COMPILED,
+    TYPICAL_MU,
+)
 from crosscheck.engines.pinocchio.model import Loads, Mechanism
 from crosscheck.engines.pinocchio.new_models import NewModels
 from crosscheck.engines.shared.driver_motion import motion, stated_rate
@@ -38,7 +47,10 @@ CLOSED_ENOUGH = 1e-8  # m and rad; largest residual of a result
 # rad; a driver moves by at most this in one adaptive step, since closures may change branch within larger
 # ones
 TURN_PER_STEP = 0.25
-HINTS = {"defaults": ": the default solver settings fail on redundant closures"}
+HINTS = {
+    "defaults": ": the default solver settings fail on redundant closures",
+    **dict.fromkeys(ANCHORED, ": the solver did not converge"),
+}
 
 
 class Simulation:
@@ -66,8 +78,12 @@ class Simulation:
         for closure in self.mechanism.closures if family == "baumgarte" else ():
             root = BAUMGARTE / setting.options["step"]
             closure.setBaumgarteCorrectorParameters(pin.BaumgarteCorrectorParameters(root**2, 2 * root))
+        closures, options = self.mechanism.closures, setting.options
+        self.is_looped = len(closures) > 0 and LCABA in (family, options.get("solver"))
+        if self.is_looped:
+            closures = [ground_second(pin, self.model, closure) for closure in closures]
         self.closures = pin.StdVec_RigidConstraintModel()
-        self.closures.extend(self.mechanism.closures)
+        self.closures.extend(closures)
         self.closure_data = pin.StdVec_RigidConstraintData()
         self.closure_data.extend([c.createData() for c in self.closures])
         self.data = self.model.createData()
@@ -77,11 +93,17 @@ class Simulation:
         self.hint = HINTS.get(family, "")
         given = ((), ()) if family == "defaults" else (CONVERGED, FORCES)
         self.solver, self.sampler = (pin.ProximalSettings(*options) for options in given)
-        options = setting.options
+        if self.is_looped:
+            self.solver = self.sampler = pin.ProximalSettings(CONVERGED[0], TYPICAL_MU, CONVERGED[2])
+            pin.computeJointMinimalOrdering(self.model, self.data, self.closures)
+        if family in ANCHORED:
+            beta = BAUMGARTE / options["step"]
+            self.new = NewModels(pin, self.model, self.closures, family.upper(), beta)
         if family == CHOSEN:
             solver = pin.ProximalSettings(CONVERGED[0], options["mu"], options["iterations"])
             self.solver = self.sampler = solver
-            self.new = NewModels(pin, self.model, self.closures) if options["models"] == "new" else None
+            if options["solver"] not in ("constraintDynamics", LCABA):
+                self.new = NewModels(pin, self.model, self.closures, options["solver"])
         if family in (*FIXED, CHOSEN):
             self.step: Step = partial(self._rk4, setting.options["step"])
         elif family in ("dop853", "tuned"):
@@ -146,9 +168,8 @@ class Simulation:
         tau = self.loads.constant if self.still else self.loads.torques(t, q, v)
         if self.new:
             return self.new.accelerations(q, v, tau)
-        return self.pin.constraintDynamics(
-            self.model, self.data, q, v, tau, self.closures, self.closure_data, solver
-        )
+        solve = self.pin.lcaba if self.is_looped else self.pin.constraintDynamics
+        return solve(self.model, self.data, q, v, tau, self.closures, self.closure_data, solver)
 
     def on_spheres(self, t: float, y: np.ndarray) -> np.ndarray:
         """Return the state with unit quaternions and driven coordinates as prescribed."""
@@ -208,7 +229,8 @@ class Simulation:
         q, v = self.split(t, self.y)
         motion = self.link_motion(t, q, v)
         scene, tree = self.mechanism.scene, self.mechanism.tree
-        return sample_of(scene, tree, motion, self.closing() if scene.has_mass() else None)
+        closing = self.closing() if scene.has_mass() and not self.is_looped else None
+        return sample_of(scene, tree, motion, closing)
 
     def link_motion(self, t: float, q: np.ndarray, v: np.ndarray) -> LinkMotion:
         """Return the motion of the links; the closure forces of this state are then in the closures' data."""
@@ -241,3 +263,11 @@ class Simulation:
             place = self.data.oMi[closure.joint1_id] * closure.joint1_placement
             wrenches[k] = -place.act(force).vector
         return wrenches
+
+
+def ground_second(pin: Any, model: Any, closure: Any) -> Any:
+    """Return a closure whose first joint is not the ground, on which lcaba writes outside its memory."""
+    if closure.joint1_id:
+        return closure
+    ends = (closure.joint2_id, closure.joint2_placement, closure.joint1_id, closure.joint1_placement)
+    return pin.RigidConstraintModel(closure.type, model, *ends, pin.ReferenceFrame.LOCAL)

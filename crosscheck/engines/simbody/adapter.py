@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, Owner, Setting
+from crosscheck.engine import Alternatives, Cannot, Engine, Owner, Setting
 from crosscheck.engines.shared.fixed_steps import simulated
 from crosscheck.engines.shared.initial_velocities import lacks_mass
 from crosscheck.engines.shared.sampling import Counts, Failed, Sample
@@ -41,6 +41,7 @@ class Simbody(Engine):
     modules = ("opensim",)
     supports = SUPPORTS
     families, options = FAMILIES, OPTIONS
+    alternatives = (Alternatives({name: Setting(name, {"accuracy": 1e-9}) for name in INTEGRATORS}, 1e-5),)
 
     def refuses(self, scene: Scene) -> Cannot | None:
         """Refuse armatures, drivers that add a sine to a polynomial, and scenes without masses whose motion

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, Setting, Supports
+from crosscheck.engine import Alternatives, Cannot, Engine, Setting, Supports
 from crosscheck.engines.shared.everything import EVERYTHING
 from crosscheck.engines.shared.fixed_steps import simulated
 from crosscheck.engines.shared.initial_velocities import lacks_mass
@@ -26,6 +26,10 @@ from crosscheck.engines.sundials.ida import Run
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 
+DENSE = "dense"
+SOLVERS = (DENSE, "lapackdense", "band")
+WAY = {"rtol": 1e-9}
+OPTIONS = {"rtol": "relative tolerance", "solver": f"IDA's linear solver: {', '.join(SOLVERS)}"}
 RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 FAMILY = "ggl"
 FAMILIES = {FAMILY: "IDA on the equations of Gear, Gupta and Leimkuhler, of index 1"}
@@ -37,7 +41,8 @@ class Sundials(Engine):
     name = "sundials"
     package = "scikit-sundae"
     modules = ("sksundae.ida",)
-    families, options = FAMILIES, {"rtol": "relative tolerance"}
+    families, options = FAMILIES, OPTIONS
+    alternatives = (Alternatives({name: Setting(FAMILY, {**WAY, "solver": name}) for name in SOLVERS}, 1e-6),)
     supports = Supports(
         EVERYTHING.joints, EVERYTHING.drivers, ("moment", "force", "spring", "torsion_spring")
     )
@@ -58,7 +63,7 @@ class Sundials(Engine):
 def _simulation(scene: Scene, setting: Setting) -> Run:
     from sksundae.ida import IDA
 
-    return Run(IDA, scene, setting.options["rtol"])
+    return Run(IDA, scene, setting.options["rtol"], setting.options.get("solver", DENSE))
 
 
 ENGINE = Sundials()

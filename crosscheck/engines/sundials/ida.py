@@ -36,10 +36,10 @@ ENDINGS = {  # IDA's return flags → sentence
 
 
 class Run:
-    """One simulation; ``ida`` is the class of the solver."""
+    """One simulation; ``ida`` is the class of the solver, ``linear`` the name of its linear solver."""
 
-    def __init__(self, ida: Any, scene: Scene, rtol: float):
-        self.ida, self.scene, self.rtol = ida, scene, rtol
+    def __init__(self, ida: Any, scene: Scene, rtol: float, linear: str = "dense"):
+        self.ida, self.scene, self.rtol, self.linear = ida, scene, rtol, linear
         self.equations = Equations(scene)
         self.length = scene_length(scene)
         self.counts = Counts()
@@ -96,10 +96,14 @@ class Run:
         )
         self.y = np.concatenate([start, np.zeros(2 * m)])
         scale = self._scale(multipliers)
+        width = len(self.y) - 1 if self.linear == "band" else None
         self.steps = INCREMENT * scale[: e.motion]
         self.solver = self.ida(
             self._residual,
             jacfn=self._matrix,
+            linsolver=self.linear,
+            lband=width,
+            uband=width,
             rtol=self.rtol,
             atol=self.rtol * scale,
             max_num_steps=MAX_STEPS,

@@ -48,6 +48,7 @@ COMMANDS = {
         ("findings",),
         ("closed-loops",),
         ("convergence",),
+        ("invariants",),
         ("modes",),
         ("reference", "four_bar_gravity", *SHORT, "--out", "reference.csv"),
         ("judge", "four_bar_gravity", "motion.csv"),
