@@ -13,6 +13,7 @@ from crosscheck.engines.loaders import loader
 from crosscheck.engines.loaders.loader import Built, Loader, built
 from crosscheck.engines.loaders.machine import Machine, Vector
 from crosscheck.files.differences import Difference, of_reading
+from crosscheck.files.dynamics import moves_alone, of_dynamics, random_rates
 from crosscheck.files.matching import matched
 from crosscheck.files.meaning import form_of, meant
 from crosscheck.files.merged import size_of
@@ -21,6 +22,7 @@ from crosscheck.files.statics_differences import of_statics
 from crosscheck.processes.child import Child, ChildFailed
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s², of gravity torques where the file has no gravity
+WITHOUT_MOTION = ("limits", "friction", "gravity", "reference")  # fields on which accelerations do not depend
 WITHOUT_STATICS = {  # fields on which neither mass matrix nor gravity torques depend
     *("limits", "friction", "damping", "stiffness", "rest", "reference", "pitch"),
     *("coupling", "law", "loop", "gravity"),
@@ -41,12 +43,16 @@ class Reader:
 
 @dataclass(frozen=True)
 class File:
-    """A file with its format, its meaning, and the poses and gravity of statics."""
+    """A file with its format, its meaning, and the poses, rates and gravity of statics and accelerations.
+
+    ``rates`` are empty unless the machine is a tree of hinges and slides.
+    """
 
     path: Path
     form: str
     machine: Machine
     poses: Sequence[Pose]
+    rates: Sequence[Pose]
     gravity: Vector
 
 
@@ -82,7 +88,10 @@ def file_of(path: Path) -> File:
     """Return a file with its meaning; raises SceneError for a faulty file, OSError."""
     form = form_of(path)
     machine = meant(path, form)
-    return File(path, form, machine, poses(machine, size_of(machine)), machine.gravity or GRAVITY)
+    size = size_of(machine)
+    asked = poses(machine, size)
+    speeds = random_rates(machine, size, len(asked)) if moves_alone(machine) else []
+    return File(path, form, machine, asked, speeds, machine.gravity or GRAVITY)
 
 
 def read(reader: Reader, file: File, time_limit: float) -> Reading:
@@ -94,7 +103,7 @@ def read(reader: Reader, file: File, time_limit: float) -> Reading:
 def read_in(child: Child, reader: Reader, file: File, time_limit: float) -> Reading:
     """Return the reading of a file in a child process, which has ended if the file is refused."""
     began, of_reader = time.monotonic(), loader(reader.name)
-    asked = reader.name, file.path.resolve(), file.form, file.poses, file.gravity
+    asked = reader.name, file.path.resolve(), file.form, file.poses, file.rates, file.gravity
     try:
         seen = child.call(_built, asked, time_limit)
     except ChildFailed as failure:
@@ -105,9 +114,11 @@ def read_in(child: Child, reader: Reader, file: File, time_limit: float) -> Read
     return _compared(of_reader, file, seen.value, seen.printed, time.monotonic() - began)
 
 
-def _built(name: str, path: Path, form: str, asked: Sequence[Pose], gravity: Vector) -> Built:
+def _built(
+    name: str, path: Path, form: str, asked: Sequence[Pose], rates: Sequence[Pose], gravity: Vector
+) -> Built:
     """Return what a loader built; called in the child."""
-    return built(loader(name), path, form, asked, gravity)
+    return built(loader(name), path, form, asked, rates, gravity)
 
 
 def _compared(of_reader: Loader, file: File, found: Built, printed: str, seconds: float) -> Reading:
@@ -117,13 +128,16 @@ def _compared(of_reader: Loader, file: File, found: Built, printed: str, seconds
     explained = [difference for difference in reading if difference.field not in WITHOUT_STATICS]
     lines = [line.strip() for line in COLOURS.sub("", printed).splitlines() if line.strip()]
     messages = (*found.machine.messages, *lines)
-    differences = (*reading, *(() if explained else statics))  # numbers of statics follow from these
+    differences = [*reading, *([] if explained else statics)]  # numbers of statics follow from these
+    if all(difference.field in WITHOUT_MOTION for difference in differences):
+        asked = file.poses, file.rates, file.gravity
+        differences += of_dynamics(match, found.accelerations, *asked, tolerance)
     machine = replace(found.machine, messages=messages)
     return Reading(
         of_reader.name,
         found.version,
         machine,
-        differences,
+        tuple(differences),
         refusal="",
         messages=messages,
         unknown=found.fault,

@@ -20,6 +20,8 @@ from crosscheck.files.reading import SAME, File, Reader, Reading, Say, read
 from mbref.scene import SceneError
 
 NAME = "root_of_all"
+DRAKE = "{drake.mit.edu}mimic"  # an element of Drake's own in SDF
+ET.register_namespace("drake", "drake.mit.edu")
 
 
 @dataclass(frozen=True)
@@ -114,6 +116,21 @@ def _direct_mimics(root: ET.Element) -> bool:
     return changed
 
 
+def _drake_mimics(root: ET.Element) -> bool:
+    """Write each law without reference also as an element of Drake."""
+    found = False
+    for joint in root.iter("joint"):
+        if (mimic := joint.find("axis/mimic")) is None or joint.find(DRAKE) is not None:
+            continue
+        if float(mimic.findtext("reference", "0")):
+            continue
+        law = {"joint": str(mimic.get("joint"))}
+        law |= {tag: mimic.findtext(tag, d) for tag, d in (("multiplier", "1"), ("offset", "0"))}
+        ET.SubElement(joint, DRAKE, law)
+        found = True
+    return found
+
+
 def _gravity(root: ET.Element) -> bool:
     world = root.find("world")
     if world is None or world.find("gravity") is not None:
@@ -130,6 +147,9 @@ REPAIRS = (
     Repair("give each axis the length one", (MJCF, URDF), _unit_axes),
     Repair("let each <mimic> name a joint that follows none", (URDF,), _direct_mimics),
     Repair("write the gravity of the world", (SDF,), _gravity),
+    Repair(
+        "write each <mimic> also as <drake:mimic joint multiplier offset> of the joint", (SDF,), _drake_mimics
+    ),
 )
 
 

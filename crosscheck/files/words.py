@@ -60,7 +60,7 @@ def part(difference: Difference) -> str:
     """Return the name of a part with its kind, such as ``joint crank: axis``."""
     if difference.part == "gravity":
         return "gravity"
-    if difference.part == "statics":
+    if difference.part in ("statics", "motion"):
         return f"{difference.field} of {difference.name}"
     field = "" if difference.field == difference.part else f": {difference.field}"
     return f"{difference.part} {difference.name}{field}"
@@ -77,7 +77,7 @@ def sentence(alike: Sequence[Difference], messages: Sequence[str]) -> str:
     if first.part == "gravity":
         parts = first.field
     elif first.field != first.part:
-        parts = f"{first.field} of {names if first.part == 'statics' else parts}"
+        parts = f"{first.field} of {names if first.part in ('statics', 'motion') else parts}"
     if first.kind == ADDED:
         return f"{parts} {'are' if several else 'is'} not in the file"
     if first.kind != LOST:

@@ -115,7 +115,7 @@ def test_pinocchio_builds_the_machine_of_the_urdf(name):
     """Bodies, joints and couplings, and the mass matrix and weight at four poses, are those of the file."""
     pytest.importorskip("pinocchio")
     file = file_of(KINDS / name)
-    found = built(Pinocchio(), file.path, file.form, file.poses, file.gravity)
+    found = built(Pinocchio(), file.path, file.form, file.poses, (), file.gravity)
     match = matched(file.machine, found.machine, DOUBLE)
     differences = [
         *of_reading(match, DOUBLE),

@@ -40,6 +40,7 @@ TYPES = {
     "ScrewJoint": "screw",
 }
 UNLIMITED = 1e16  # rad or m; SDF writes it for an axis without limits
+INSTANT = 1e-12  # s; dampers and springs act at the end of a step
 LOOPS = {
     "WeldJointConstraint": FIXED,
     "BallJointConstraint": "spherical",
@@ -77,12 +78,13 @@ class Dart(Loader):
 
 
 class Skeletons(Loaded):
-    """Skeletons at their initial positions, in a world or without one."""
+    """Skeletons where all coordinates are 0, in a world or without one."""
 
     def __init__(self, dart: Any, skeletons: list[Any], world: Any):
         self.dart, self.skeletons, self.world = dart, skeletons, world
         self.joints = [s.getJoint(k) for s in skeletons for k in range(s.getNumJoints())]
         self.nodes = [s.getBodyNode(k) for s in skeletons for k in range(s.getNumBodyNodes())]
+        self.messages = tuple(self._moved())
 
     def machine(self) -> Machine:
         return Machine(
@@ -91,7 +93,16 @@ class Skeletons(Loaded):
             loops=tuple(self._loops()),
             couplings=tuple(self._couplings()),
             gravity=None if self.world is None else vector(self.world.getGravity()),
+            messages=self.messages,
         )
+
+    def _moved(self) -> Iterator[str]:
+        """Put all coordinates to 0; yield a message for a joint that DART starts elsewhere."""
+        for joint in self.joints:
+            if joint.getNumDofs() == 1:
+                if start := joint.getPosition(0):
+                    yield f"starts at {start:.6g} of joint {joint.getName()!r}, between its limits"
+                joint.setPosition(0, 0.0)
 
     def _at(self, node: Any) -> Place:
         frame = node.getWorldTransform()
@@ -129,7 +140,7 @@ class Skeletons(Loaded):
             rest=float(joint.getRestPosition(0)) if stiffness else None,
             armature=0.0,
             friction=float(joint.getCoulombFriction(0)),
-            reference=float(joint.getPosition(0)),
+            reference=0.0,
             **limits(joint.getPositionLowerLimit(0), joint.getPositionUpperLimit(0), UNLIMITED),
         )
 
@@ -148,10 +159,23 @@ class Skeletons(Loaded):
             if joint.getNumDofs() == 1 and joint.getActuatorType() == mimic:
                 yield Coupling(joint.getName(), joint.getName(), "", ())  # Python has no access to the law
 
+    def accelerations(
+        self, pose: Mapping[str, float], rates: Mapping[str, float], gravity: Vector
+    ) -> dict[str, float]:
+        single = [joint for joint in self.joints if joint.getNumDofs() == 1]
+        for joint in single:
+            joint.setPosition(0, pose.get(joint.getName(), 0.0))
+            joint.setVelocity(0, rates.get(joint.getName(), 0.0))
+        for skeleton in self.skeletons:
+            skeleton.setGravity(np.array(gravity))
+            skeleton.setTimeStep(INSTANT)
+            skeleton.computeForwardDynamics()
+        return {joint.getName(): float(joint.getAcceleration(0)) for joint in single}
+
     def statics(self, pose: Mapping[str, float], gravity: Vector) -> Statics:
         for joint in self.joints:
             if joint.getNumDofs() == 1:
-                joint.setPosition(0, joint.getInitialPosition(0) + pose.get(joint.getName(), 0.0))
+                joint.setPosition(0, pose.get(joint.getName(), 0.0))
         names, places, size = list[str](), list[int](), sum(s.getNumDofs() for s in self.skeletons)
         mass, torque, start = np.zeros((size, size)), np.zeros(size), 0
         for skeleton in self.skeletons:

@@ -55,18 +55,18 @@ class Drake(Loader):
 
     def load(self, path: Path, form: str) -> Loaded:
         """Parse the file."""
-        return Plant(path, form, None)
+        return Plant(path, form)
 
 
 class Plant(Loaded):
-    """A plant at its default positions."""
+    """A plant at its default positions; a ``step`` (s) of 0 makes it continuous."""
 
-    def __init__(self, path: Path, form: str, gravity: Vector | None):
+    def __init__(self, path: Path, form: str, gravity: Vector | None = None, step: float = STEP):
         from pydrake.multibody.parsing import Parser
         from pydrake.multibody.plant import MultibodyPlant
 
         self.path, self.form = path, form
-        self.plant = plant = MultibodyPlant(STEP)
+        self.plant = plant = MultibodyPlant(step)
         models = Parser(plant).AddModels(str(path))
         bodies = [plant.get_body(i) for model in models for i in plant.GetBodyIndices(model)]
         if form == URDF and (root := _root_link(path)) != WORLD:
@@ -80,12 +80,12 @@ class Plant(Loaded):
 
     def machine(self) -> Machine:
         number = self.plant.num_constraints()  # their kinds cannot be asked
-        is_urdf = self.form == URDF
+        laws = number if self.form == URDF else min(number, _own_mimics(self.path))
         return Machine(
             bodies=tuple(map(self._body, self.bodies)),
             joints=tuple(map(self._joint, self.joints)),
-            loops=() if is_urdf else tuple(Loop("", "", ("", "")) for _ in range(number)),
-            couplings=tuple(Coupling("", "", "", ()) for _ in range(number if is_urdf else 0)),
+            loops=tuple(Loop("", "", ("", "")) for _ in range(number - laws)),
+            couplings=tuple(Coupling("", "", "", ()) for _ in range(laws)),
             gravity=vector(self.plant.gravity_field().gravity_vector()),
         )
 
@@ -158,6 +158,23 @@ class Plant(Loaded):
             q[place] = value
         self.plant.SetPositions(context, q)
 
+    def accelerations(
+        self, pose: Mapping[str, float], rates: Mapping[str, float], gravity: Vector
+    ) -> dict[str, float]:
+        found = Plant(self.path, self.form, gravity, step=0.0)
+        plant, context = found.plant, found.plant.CreateDefaultContext()
+        single = {j.name(): j for j in found.joints if TYPES.get(j.type_name()) in SCALAR}
+        start = {name: float(joint.default_positions()[0]) for name, joint in single.items()}
+        found._put(
+            context, {j.position_start(): start[name] + pose.get(name, 0.0) for name, j in single.items()}
+        )
+        v = np.zeros(plant.num_velocities())
+        for name, joint in single.items():
+            v[joint.velocity_start()] = rates.get(name, 0.0)
+        plant.SetVelocities(context, v)
+        change = plant.EvalTimeDerivatives(context).CopyToVector()[plant.num_positions() :]
+        return {name: float(change[joint.velocity_start()]) for name, joint in single.items()}
+
     def statics(self, pose: Mapping[str, float], gravity: Vector) -> Statics:
         if vector(self.plant.gravity_field().gravity_vector()) != tuple(gravity):
             self.__init__(self.path, self.form, gravity)  # type: ignore[misc]
@@ -171,6 +188,11 @@ class Plant(Loaded):
         centres = {body.name(): vector(self._body(body).centre or ()) for body in self.bodies}
         names = tuple(joint.name() for joint in single)
         return Statics(names, matrix(mass[np.ix_(dofs, dofs)]), vector(torque[dofs]), centres)
+
+
+def _own_mimics(path: Path) -> int:
+    """Return the number of Drake's own <drake:mimic> elements in a file."""
+    return sum(1 for _ in ET.parse(path).getroot().iter("{drake.mit.edu}mimic"))
 
 
 def _root_link(path: Path) -> str:

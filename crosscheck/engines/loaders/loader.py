@@ -26,6 +26,13 @@ class Loaded(ABC):
         """Return the engine's own mass matrix and gravity torques at displacements (rad or m) of joints from
         the reference pose; a joint without entry stays there."""
 
+    def accelerations(
+        self, pose: Mapping[str, float], rates: Mapping[str, float], gravity: Vector
+    ) -> dict[str, float]:
+        """Return the engine's own accelerations of hinges and slides at a pose and rates, without motors,
+        limits and dry friction. A reader without dynamics raises NotImplementedError."""
+        raise NotImplementedError
+
 
 class Loader(ABC):
     """A reader of files of ``formats`` in ``package``; ``version`` is installed where the package is
@@ -52,25 +59,33 @@ class Loader(ABC):
 
 @dataclass(frozen=True)
 class Built:
-    """Version of the package, the machine, and statics at each pose; ``fault`` is why statics are missing."""
+    """Version of the package, the machine, statics and accelerations at each pose; ``fault`` is why they are
+    missing."""
 
     version: str
     machine: Machine
     statics: tuple[Statics, ...]
+    accelerations: tuple[dict[str, float], ...] = ()
     fault: str = ""
 
 
 def built(
-    loader: Loader, path: Path, form: str, poses: Sequence[Mapping[str, float]], gravity: Vector
+    loader: Loader,
+    path: Path,
+    form: str,
+    poses: Sequence[Mapping[str, float]],
+    rates: Sequence[Mapping[str, float]],
+    gravity: Vector,
 ) -> Built:
     """Return the engine's reading of a file; raises whatever the engine raises while it reads."""
     loaded = loader.load(path, form)
     machine, fault = loaded.machine(), ""
-    found: list[Statics] = []
+    found, moved = list[Statics](), list[dict[str, float]]()
     try:
         found = [loaded.statics(pose, gravity) for pose in poses]
+        moved = [loaded.accelerations(p, v, gravity) for p, v in zip(poses, rates, strict=False)]
     except NotImplementedError as reason:
         fault = str(reason)
     except Exception as error:  # an engine may raise anything about its own model
         fault = f"{type(error).__name__}: {error}"
-    return Built(loader.installed(), machine, tuple(found), fault)
+    return Built(loader.installed(), machine, tuple(found), tuple(moved), fault)

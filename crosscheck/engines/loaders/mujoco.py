@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -27,6 +28,8 @@ from crosscheck.engines.loaders.machine import (
     matrix,
     vector,
 )
+from crosscheck.engines.mujoco.importing.couplings import of_equalities
+from crosscheck.engines.mujoco.importing.posing import JointRow
 
 TYPES = {0: "free", 1: "spherical", 2: TRANSLATIONAL, 3: REVOLUTE}  # by mjtJoint
 
@@ -141,14 +144,19 @@ class Compiled(Loaded):
 
     def _couplings(self) -> Iterator[Coupling]:
         m, kinds = self.model, self.mujoco.mjtEq
+        rows = {r.name: r for r in of_equalities(self.mujoco, copy.copy(m)) if isinstance(r, JointRow)}
         for e in np.flatnonzero(m.eq_active0):
             kind, first, second = (int(v[e]) for v in (m.eq_type, m.eq_obj1id, m.eq_obj2id))
             if kind not in (kinds.mjEQ_JOINT, kinds.mjEQ_TENDON):
                 continue
-            name_of = self.joint if kind == kinds.mjEQ_JOINT else (lambda k: f"tendon {m.tendon(k).name}")
-            leader = name_of(second) if second >= 0 else ""
-            name = str(m.equality(e).name) or f"equality {e}"
-            yield Coupling(name, name_of(first), leader, coefficients(*m.eq_data[e, :5]))
+            name, law = str(m.equality(e).name) or f"equality {e}", coefficients(*m.eq_data[e, :5])
+            row = rows.get(name)
+            if kind == kinds.mjEQ_TENDON and row is None:  # of tendons that are no sum of two coordinates
+                yield Coupling(name, f"tendon {m.tendon(first).name}", "", law)
+                continue
+            if kind == kinds.mjEQ_TENDON and row is not None:
+                (first, second), law = row.joints, coefficients(row.offset, row.ratio)
+            yield Coupling(name, self.joint(first), self.joint(second) if second >= 0 else "", law)
 
     def statics(self, pose: Mapping[str, float], gravity: Vector) -> Statics:
         m, data = self.model, self.data
@@ -165,6 +173,20 @@ class Compiled(Loaded):
         centres = {self.body(b): vector(data.xipos[b]) for b in range(1, m.nbody)}
         names = tuple(self.joint(j) for j in single)
         return Statics(names, matrix(self._mass()[np.ix_(dofs, dofs)]), vector(torque[dofs]), centres)
+
+    def accelerations(
+        self, pose: Mapping[str, float], rates: Mapping[str, float], gravity: Vector
+    ) -> dict[str, float]:
+        m, data, bits = self.model, self.data, self.mujoco.mjtDisableBit
+        m.opt.gravity[:] = gravity
+        m.opt.disableflags = int(bits.mjDSBL_CONSTRAINT | bits.mjDSBL_ACTUATION)
+        data.qpos[:], data.qvel[:] = m.qpos0, 0.0
+        dofs = {self.joint(j): int(m.jnt_dofadr[j]) for j in range(m.njnt)}
+        for j in range(m.njnt):
+            data.qpos[m.jnt_qposadr[j]] += pose.get(self.joint(j), 0.0)
+            data.qvel[m.jnt_dofadr[j]] = rates.get(self.joint(j), 0.0)
+        self.mujoco.mj_forward(m, data)
+        return {name: float(data.qacc[dof]) for name, dof in dofs.items()}
 
     def _mass(self) -> np.ndarray:
         """Return the mass matrix (nv, nv)."""

@@ -26,6 +26,7 @@ from crosscheck.engines.loaders.machine import (
     vector,
 )
 from crosscheck.engines.loaders.placing import Place
+from crosscheck.engines.mujoco.importing.actuators import Actuators
 from mbref import formats, rotations
 from mbref.scene import GROUND, Scene, SlideSpring, TorsionSpring
 from mbref.scene import Joint as AnyJoint
@@ -48,14 +49,15 @@ class Own(Loader):
         if path.suffix != ending:
             raise ValueError(f"the importers read this format from files that end in {ending}")
         found = formats.read(path, formats.ImportOptions(without=EVERYTHING))
-        return Imported(found.scene, (*found.left_out, *found.notes))
+        motors = _servos(path) if form == MJCF else {}
+        return Imported(found.scene, (*found.left_out, *found.notes), motors)
 
 
 class Imported(Loaded):
-    """A scene at its start."""
+    """A scene at its start; ``motors`` are stiffness and damping that actuators give joints."""
 
-    def __init__(self, scene: Scene, messages: tuple[str, ...]):
-        self.scene, self.messages = scene, messages
+    def __init__(self, scene: Scene, messages: tuple[str, ...], motors: Mapping[str, tuple[float, float]]):
+        self.scene, self.messages, self.motors = scene, messages, motors
 
     def machine(self) -> Machine:
         tree, loops = self._tree()
@@ -114,15 +116,17 @@ class Imported(Loaded):
                 )
             )
         free = [body.name for body in self.scene.body if end(body.name) != end(GROUND)]
-        first_of = {end(name): name for name in reversed(free)}
-        return [*(Joint(f"{n} free", "free", (WORLD, n)) for n in first_of.values()), *tree], loops
+        bases = dict.fromkeys(map(end, free))
+        return [*(Joint(f"{n} free", "free", (WORLD, n)) for n in bases), *tree], loops
 
     def _numbers(self, joint: AnyJoint) -> dict[str, Any]:
         """Return the numbers of a joint; a scene has neither limits nor dry friction."""
         springs = [
             load
             for load in self.scene.load
-            if isinstance(load, TorsionSpring | SlideSpring) and load.joint == joint.name
+            if isinstance(load, TorsionSpring | SlideSpring)
+            and load.joint == joint.name
+            and not np.allclose((load.stiffness, load.damping), self.motors.get(joint.name, math.inf))
         ]
         stiffness = coefficients(sum(spring.stiffness for spring in springs))
         found: dict[str, Any] = {
@@ -147,6 +151,19 @@ class Imported(Loaded):
 
     def statics(self, pose: Mapping[str, float], gravity: Vector) -> Statics:
         raise NotImplementedError  # a scene has no joint coordinates
+
+
+def _servos(path: Path) -> dict[str, tuple[float, float]]:
+    """Return the stiffness and damping of the actuators of each joint, which a scene has as springs."""
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_path(str(path))
+    found: dict[str, tuple[float, float]] = {}
+    for law in Actuators(mujoco, model, -1).laws:
+        name = str(model.joint(law.joint).name)
+        stiffness, damping = found.get(name, (0.0, 0.0))
+        found[name] = stiffness + law.stiffness, damping + law.damping
+    return found
 
 
 def _rest(spring: TorsionSpring | SlideSpring) -> float:

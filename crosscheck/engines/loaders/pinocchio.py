@@ -193,16 +193,8 @@ class Built(Loaded):
 
     def statics(self, pose: Mapping[str, float], gravity: Vector) -> Statics:
         self.model = m = self.coupled
-        self.data, moved = m.createData(), np.zeros(m.nv)
-        single: dict[str, int] = {}
-        for i in range(1, m.njoints):
-            name, kind = str(m.names[i]), type_of(m.joints[i])
-            if kind in (*SCALAR, COMPOSITE):
-                names = [name] if kind != COMPOSITE else [f"{name}:{k}" for k in range(m.joints[i].nv)]
-                single |= {own: m.joints[i].idx_v + k for k, own in enumerate(names) if m.joints[i].nv}
-        for name, v in single.items():
-            moved[v] = pose.get(name, 0.0)
-        q = self.pin.integrate(m, self.reference(m), moved)
+        self.data, single = m.createData(), self._single()
+        q = self._at(pose, single)
         m.gravity.linear = np.array(gravity)
         upper = np.triu(self.pin.crba(m, self.data, q))
         mass, torque = upper + np.triu(upper, 1).T, self.pin.computeGeneralizedGravity(m, self.data, q)
@@ -210,3 +202,31 @@ class Built(Loaded):
         centres = {self.body(i): self.at(i).point(m.inertias[i].lever) for i in range(1, m.njoints)}
         dofs = list(single.values())
         return Statics(tuple(single), matrix(mass[np.ix_(dofs, dofs)]), vector(torque[dofs]), centres)
+
+    def accelerations(
+        self, pose: Mapping[str, float], rates: Mapping[str, float], gravity: Vector
+    ) -> dict[str, float]:
+        m, single = self.model, self._single()
+        m.gravity.linear = np.array(gravity)
+        v = np.zeros(m.nv)
+        for name, k in single.items():
+            v[k] = rates.get(name, 0.0)
+        found = self.pin.aba(m, m.createData(), self._at(pose, single), v, np.zeros(m.nv))
+        return {name: float(found[k]) for name, k in single.items()}
+
+    def _single(self) -> dict[str, int]:
+        """Return the index of the velocity of each coordinate of hinges and slides."""
+        m, single = self.model, dict[str, int]()
+        for i in range(1, m.njoints):
+            name, kind = str(m.names[i]), type_of(m.joints[i])
+            if kind in (*SCALAR, COMPOSITE):
+                names = [name] if kind != COMPOSITE else [f"{name}:{k}" for k in range(m.joints[i].nv)]
+                single |= {own: m.joints[i].idx_v + k for k, own in enumerate(names) if m.joints[i].nv}
+        return single
+
+    def _at(self, pose: Mapping[str, float], single: Mapping[str, int]) -> np.ndarray:
+        """Return the configuration at displacements from the reference."""
+        moved = np.zeros(self.model.nv)
+        for name, v in single.items():
+            moved[v] = pose.get(name, 0.0)
+        return np.array(self.pin.integrate(self.model, self.reference(self.model), moved))

@@ -139,9 +139,9 @@ def _split(joints: list[Joint], links: list[ET.Element]) -> tuple[list[Joint], l
         tree.append(joint)
         root[second if second != WORLD else first] = first if second != WORLD else second
     for name in root:
-        if end(name) != WORLD:
-            tree.append(Joint(f"{name} free", "free", (WORLD, name)))
-            root[end(name)] = WORLD
+        if (base := end(name)) != WORLD:
+            tree.append(Joint(f"{base} free", "free", (WORLD, base)))
+            root[base] = WORLD
     return tree, loops
 
 

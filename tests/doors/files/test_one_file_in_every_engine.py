@@ -1,6 +1,7 @@
 """One file in every engine: the file's meaning, planted differences by part and kind, verdicts and advice."""
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -16,11 +17,14 @@ from crosscheck.engines.loaders.mujoco import Mujoco
 from crosscheck.engines.loaders.own import Own
 from crosscheck.files.corpus import CASES
 from crosscheck.files.corpus.case import value_at
+from crosscheck.files.corpus.mjcf import HINGE, body, model
 from crosscheck.files.corpus.mjcf_equalities import pair
 from crosscheck.files.differences import of_reading
+from crosscheck.files.dynamics import of_dynamics
 from crosscheck.files.matching import matched
 from crosscheck.files.meaning import form_of, meant
 from crosscheck.files.merged import size_of
+from crosscheck.files.reading import file_of
 from crosscheck.files.statics import poses
 from crosscheck.files.statics_differences import of_statics
 
@@ -139,6 +143,21 @@ def test_mass_matrix_and_gravity_torques_are_mujocos_at_four_poses(tmp_path: Pat
     heavier = named("joints", "elbow", armature=0.6)(machine)
     found = of_statics(matched(heavier, machine, DOUBLE), own, asked, gravity, DOUBLE)
     assert [(d.field, d.name) for d in found] == [("mass matrix", "elbow")]
+
+
+def test_accelerations_are_mujocos_and_an_engine_without_dampers_is_named(tmp_path: Path):
+    """MuJoCo's own accelerations at four random states, with a spring and two dampers, and without these."""
+    tree = '<joint name="elbow" type="hinge" axis="0 1 0" damping="0.3" stiffness="5" springref="20"/>'
+    text = model(body("upper", HINGE.replace("/>", ' damping="0.2"/>') + body("lower", tree)))
+    path, gravity = written(tmp_path, text), (1.0, 2.0, -9.0)
+    file = replace(file_of(path), gravity=gravity)
+    states = file.poses, file.rates, gravity
+    match = matched(file.machine, file.machine, DOUBLE)
+    for text_of_engine, said in ((text, []), (re.sub(' damping="[^"]*"', "", text), ["elbow", "shoulder"])):
+        engine = Mujoco().load(written(tmp_path, text_of_engine, "engine.xml"), MJCF)
+        own = [engine.accelerations(p, v, gravity) for p, v in zip(file.poses, file.rates, strict=True)]
+        found = of_dynamics(match, own, *states, 1e-9)  # of the largest: differences of order four
+        assert sorted(d.name for d in found) == said and {d.field for d in found} <= {"damping"}
 
 
 def test_verdict_names_what_is_dropped_and_whether_the_reader_says_so(tmp_path: Path, capsys: Any):

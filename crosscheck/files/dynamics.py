@@ -1,0 +1,112 @@
+"""Accelerations of a machine that is a tree of hinges and slides, and their differences from an engine's.
+
+M a = -g - c - d v - k (q - rest): mass matrix M and gravity torques g, dampers d, springs k, and velocity
+terms c = Ṁ v - ½ ∂(vᵀ M v)/∂q, from differences of order four of M along the coordinates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.loaders.machine import FIXED, REVOLUTE, SCALAR, Machine, Vector
+from crosscheck.files.differences import WRONG, Difference
+from crosscheck.files.matching import Match, ending
+from crosscheck.files.statics import Pose, statics_of
+
+SPEED, SEED = 1.0, 11  # largest rates: rad/s, and machine's sizes per s
+MOST = 30  # joints; the differences of M need four evaluations for each joint
+UNUSED = "read, and not used by its dynamics"
+STEP = 1e-3  # rad or m, of the differences, whose error is about STEP^4
+NONE = (0.0, 0.0, 0.0)  # m/s²
+FACTORS = ((-2.0, 1 / 12), (-1.0, -8 / 12), (1.0, 8 / 12), (2.0, -1 / 12))  # displacement / STEP, weight
+
+
+def moves_alone(machine: Machine) -> bool:
+    """Return whether the machine is a tree of at most MOST hinges and slides with linear springs and
+    dampers."""
+    moving = [joint for joint in machine.joints if joint.type != FIXED]
+    is_linear = all(len(j.damping or ()) < 2 and len(j.stiffness or ()) < 2 for j in moving)
+    is_tree = not machine.loops and not machine.couplings
+    return is_tree and is_linear and 0 < len(moving) <= MOST and all(j.type in SCALAR for j in moving)
+
+
+def random_rates(machine: Machine, size: float, number: int) -> list[Pose]:
+    """Return random rates of the joints, one set for each of several poses."""
+    random = np.random.default_rng(SEED)
+    joints = [joint for joint in machine.joints if joint.type in SCALAR]
+    most = {joint.name: SPEED if joint.type == REVOLUTE else SPEED * size for joint in joints}
+    return [{n: float(random.uniform(-m, m)) for n, m in most.items()} for _ in range(number)]
+
+
+def accelerations_of(
+    machine: Machine, pose: Mapping[str, float], rates: Mapping[str, float], gravity: Vector
+) -> dict[str, float]:
+    """Return the accelerations (rad/s² or m/s²) of a machine that ``moves_alone``."""
+    found = statics_of(machine, pose, gravity)
+    mass, v = np.array(found.mass), np.array([rates[name] for name in found.joints])
+    slopes = [_slope(machine, pose, name) for name in found.joints]
+    change = sum(rate * slope for rate, slope in zip(v, slopes, strict=True))
+    force = -np.array(found.gravity) - change @ v + np.array([v @ slope @ v for slope in slopes]) / 2
+    joints = {joint.name: joint for joint in machine.joints}
+    for k, name in enumerate(found.joints):
+        joint = joints[name]
+        stretched = pose[name] + (joint.reference or 0.0) - (joint.rest or 0.0)
+        force[k] -= sum(joint.damping or ()) * v[k] + sum(joint.stiffness or ()) * stretched
+    return dict(zip(found.joints, np.linalg.solve(mass, force).tolist(), strict=True))
+
+
+def _slope(machine: Machine, pose: Mapping[str, float], name: str) -> np.ndarray:
+    """Return the derivative of the mass matrix by a coordinate."""
+    parts = [
+        weight / STEP * np.array(statics_of(machine, {**pose, name: pose[name] + factor * STEP}, NONE).mass)
+        for factor, weight in FACTORS
+    ]
+    return np.asarray(sum(parts))
+
+
+def of_dynamics(
+    match: Match,
+    own: Sequence[Mapping[str, float]],
+    poses: Sequence[Pose],
+    rates: Sequence[Pose],
+    gravity: Vector,
+    tolerance: float,
+) -> list[Difference]:
+    """Return the largest difference of accelerations, relative to the largest acceleration.
+
+    If they are the accelerations without dampers, or without springs, the numbers of these are returned.
+    """
+    states = list(zip(poses, rates, own, strict=False))
+    size, found = _worst(match.file, states, gravity)
+    if found is None or size <= tolerance:
+        return []
+    for field in ("damping", "stiffness"):
+        having = [joint for joint in match.file.joints if any(getattr(joint, field) or ())]
+        nothing: dict[str, Any] = {field: ()}
+        without = {joint.name: replace(joint, **nothing) for joint in having}
+        joints = tuple(without.get(joint.name, joint) for joint in match.file.joints)
+        if having and _worst(replace(match.file, joints=joints), states, gravity)[0] <= tolerance:
+            return [Difference(WRONG, "joint", j.name, field, getattr(j, field), UNUSED) for j in having]
+    return [found]
+
+
+def _worst(
+    machine: Machine, states: Sequence[tuple[Pose, Pose, Mapping[str, float]]], gravity: Vector
+) -> tuple[float, Difference | None]:
+    """Return the largest relative difference of accelerations; none if the reader lacks a joint."""
+    pairs: list[tuple[str, float, float]] = []
+    for pose, rates, own in states:
+        named = {ending(name): value for name, value in own.items()}
+        expected = accelerations_of(machine, pose, rates, gravity)
+        if expected.keys() - named.keys():
+            return 0.0, None
+        pairs += [(name, value, named[name]) for name, value in expected.items()]
+    if not pairs:
+        return 0.0, None
+    scale = max(abs(value) for _, *both in pairs for value in both) or 1.0
+    name, value, other = max(pairs, key=lambda pair: abs(pair[2] - pair[1]))
+    return abs(other - value) / scale, Difference(WRONG, "motion", name, "acceleration", value, other)
