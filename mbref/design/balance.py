@@ -78,6 +78,21 @@ class Newton:
         moves = -self.displacements(self.off, LONGEST_STEP)
         return np.asarray(self.directions @ np.where(np.abs(parts) <= self._negligible, 0.0, moves))
 
+    def fall(self) -> np.ndarray:
+        """Return the step y (f,) with the accelerations, over the sizes of the stiffness."""
+        parts, most = self.directions.T @ self.tangent.coordinates(self.off), LONGEST_STEP / self.sizes
+        parts = np.where(np.abs(parts) <= self.bound, 0.0, parts)
+        held = np.maximum(self.stiffness, np.abs(parts) / most)
+        return np.asarray(self.directions @ (parts / np.maximum(held, 1e-300)))
+
+    @property
+    def most_unstable(self) -> np.ndarray | None:
+        """Direction y (f,) along which an equilibrium is left first, by a length or rad; None if it is
+        stable."""
+        is_left = ((self.left * self.directions).sum(axis=0) > 0.0) & self._leaves_balance
+        k = int(np.argmax(is_left))  # stiffnesses descend
+        return np.asarray(self.directions[:, k] / self.sizes[k]) if is_left.any() else None
+
     def level(self, off: np.ndarray) -> float:
         """Return the size of x'' (n,) as a displacement, lengths or rad, by the stiffness of this pose."""
         held = self._least_stiffness(LONGEST_STEP / self.sizes)

@@ -9,6 +9,7 @@ import numpy as np
 
 from mbref import rotations
 from mbref.design.balance import ONE_POSE, Newton, are_one, balanced, starts_from
+from mbref.design.falling import fallen
 from mbref.design.joint_angles import slots, spring_angles
 from mbref.design.linearisation import Tangent, multipliers, unsteady
 from mbref.design.stability import eigenvalues_of, linear_at
@@ -150,6 +151,9 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
     for tangent in poses:
         settled = _settled(tangent, freedoms)
         if settled is not None and not any(_is_known(settled, other) for other in found):
+            found.append(settled)
+    for settled in fallen(found, first, freedoms, starts - 1):
+        if not any(_is_known(settled, other) for other in found):
             found.append(settled)
     Windings(found, freedoms, _is_known).search()
     return [

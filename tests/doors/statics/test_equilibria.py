@@ -4,12 +4,13 @@ import json
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize
 
 from mbref import Scene, equilibria
 from mbref.cli.commands import main
+from mbref.scene import Spring
 from tests.helpers import parts
-from tests.helpers.statics import DOWN, G, hinge, parallelogram, pendulum, rod, slide
+from tests.helpers.statics import DOWN, ORIGIN, G, hinge, parallelogram, pendulum, rod, slide
 
 MASS, INERTIA, ARM = 2.0, 0.3, 0.7
 ABOUT_HINGE = INERTIA + MASS * ARM**2
@@ -105,6 +106,40 @@ def test_two_rods_that_a_spring_of_any_stiffness_straightens_are_found_hanging(s
     [found] = equilibria(scene, starts=1)
     assert found.stability == "stable"
     assert np.allclose(found.scene.body[1].position, (0.0, -1.5, 0.0), atol=1e-9)
+
+
+@pytest.mark.parametrize("stiffness", [pytest.param(1e3, marks=pytest.mark.slow), 1e7])
+def test_chain_that_a_stiff_spring_holds_is_found_in_both_stable_poses(stiffness):
+    """Three rods hang from the origin; a spring holds the middle of the second one. The potential energy is
+    least near the given pose, and near the pose to 10 mm to which scipy comes from the hanging one."""
+    lengths, masses, start = np.array([1.0, 1.0, 0.5]), np.array([2.0, 2.0, 1.0]), np.array([0.5, 1.0, 1.5])
+
+    def places(angles):
+        ways = lengths * np.array([np.sin(angles), -np.cos(angles), 0 * angles])
+        return np.cumsum(ways, axis=1).T - ways.T / 2
+
+    held, fixed = places(start)[1], np.array([0.5, -1.2, 0.0])
+    natural = float(np.linalg.norm(held - fixed))
+
+    def energy(angles):
+        longer = np.linalg.norm(places(angles)[1] - fixed) - natural
+        return masses @ places(angles)[:, 1] * G + stiffness * longer**2 / 2
+
+    names, ends = ["ground", "b0", "b1", "b2"], 2 * places(start)
+    anchors = [ORIGIN, ends[0], ends[1] - ends[0]]
+    scene = Scene(
+        name="chain",
+        gravity=DOWN,
+        body=[rod(*each) for each in zip(names[1:], places(start), masses, strict=True)],
+        joint=[hinge(f"J{k}", (names[k], names[k + 1]), anchors[k]) for k in range(3)],
+        load=[
+            Spring(bodies=("ground", "b1"), points=(fixed, held), stiffness=stiffness, natural_length=natural)
+        ],
+    )
+    stable = [e.scene.body[2].position for e in equilibria(scene, starts=2) if e.stability == "stable"]
+    for guess in (start, np.zeros(3)):
+        least = minimize(energy, guess, method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-13}).x
+        assert min(np.abs(place - places(least)[2]).max() for place in stable) < 0.01
 
 
 def test_rod_on_a_stiff_slide_along_a_pendulum_is_found_hanging():
