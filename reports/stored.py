@@ -14,7 +14,7 @@ from crosscheck.judge.model_identity import gate_times
 from crosscheck.study.grid import Record
 from crosscheck.study.record_shape import Picture, Timing, Truth, Verdicts, WholeRun, checked
 from crosscheck.study.record_view import of_scenes, with_time
-from crosscheck.study.store import read, unpacked
+from crosscheck.study.store import read, read_scenes, unpacked
 from mbref.records import RecordsError, json_content
 from mbref.scene import Scene
 
@@ -38,7 +38,7 @@ def groups(folder: Path) -> list[SceneRuns]:
 
 
 def _groups(folder: Path) -> list[SceneRuns]:
-    scenes = [Scene.from_file(path) for path in sorted((folder / "scenes").glob("*.toml"))]
+    scenes = read_scenes(folder)
     named = {scene.name: scene for scene in scenes}
     times = read(folder / "timings.jsonl", Timing)
     stored = [_of_known_scenes(folder / f"{name}.jsonl", shape, named) for name, shape in SHAPES.items()]

@@ -11,10 +11,9 @@ from typing import NamedTuple
 from crosscheck.study.grid import Record
 from crosscheck.study.record_shape import Timing, checked
 from crosscheck.study.record_view import ended, error, error_bound, error_text, is_completed, of_scenes
-from crosscheck.study.store import read, unpacked
+from crosscheck.study.store import read, read_scenes, unpacked
 from crosscheck.study.words.text import runs
 from mbref.records import looked_at
-from mbref.scene import Scene, SceneError
 
 ERROR_RATIO = 2.0  # larger ratios of errors are changes; rounding scatters errors above NOISE by less
 NOISE = 1e-12  # smaller errors are rounding errors
@@ -76,11 +75,8 @@ def _loaded(file: Path, named: Path) -> dict[Identity, Record]:
 def _of_the_report(file: Path, records: Sequence[Record]) -> Sequence[Record]:
     """Return the records whose mechanisms equal the present scenes of the report's folder; all records if the
     folder has no scenes."""
-    paths = sorted((file.parent / "scenes").glob("*.toml"))
-    try:
-        return of_scenes(records, [Scene.from_file(path) for path in paths]) if paths else records
-    except SceneError as error:
-        raise ValueError(f"{file.parent / 'scenes'}: {error}") from None
+    scenes = read_scenes(file.parent)
+    return of_scenes(records, scenes) if scenes else records
 
 
 def identity(record: Record) -> Identity:

@@ -117,6 +117,8 @@ class Ladder(_Shape):
     asked: _Asked
     metrics: dict[str, float | None]
     versions: dict[str, str | None]
+    commit: str | None = None
+    date: str | None = None
 
 
 class Refused(_Shape):

@@ -16,6 +16,7 @@ from crosscheck.study.provenance import made_by
 from crosscheck.study.record_shape import Cost, Measured, Record, Refused, Run, checked
 from mbref.motions.trajectory import Outcome
 from mbref.records import RecordsError, looked_at, strict_json
+from mbref.scene import Scene, SceneError
 
 REFUSED = "REFUSED"  # outcome of a record without a run
 METRICS, ORIGIN = ("error", "error_bound", "violation_position"), ("time_limit", "commit", "date")
@@ -29,6 +30,17 @@ def read(path: Path, shape: type[BaseModel] = Run) -> dict[str, Record]:
     """Return the records of a file by key; empty if there is no file. Raises RecordsError."""
     found = looked_at(path)
     checked(path, list(found.values()), shape)
+    return found
+
+
+def read_scenes(folder: Path) -> list[Scene]:
+    """Return the scenes of a report's folder; raises RecordsError that names a faulty file, OSError."""
+    found = []
+    for path in sorted((folder / "scenes").glob("*.toml")):
+        try:
+            found.append(Scene.from_file(path))
+        except SceneError as error:
+            raise RecordsError(f"{path}: {error.faults[0]}") from None
     return found
 
 

@@ -22,6 +22,7 @@ FAULTS: list[tuple[str, Any]] = [
     ("scene", 1),
     ("asked", {"engine": "mbref"}),
     ("versions", []),
+    ("commit", [[1]]),
     ("bodies", {"crank": {"position": [[0.0, 0.0]] * 2, "orientation": []}}),
     ("reactions", {"A": [["far"] * 6] * 2}),
     ("angles", {"A": [10**400, 0.0]}),
