@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from mbref.scene import Scene
 
+MOST_COUPLED = 2  # coordinates of a coupling of adapters that do not declare sums
 LONGEST_TEXT = 1000  # characters of an engine's message that are kept: about ten lines of a terminal
 TABLE, FACTOR = "table", "factor"  # features of a driver and of a load
 
@@ -72,6 +73,8 @@ class Supports:
         ``"factor"`` of a load.
     massless_links : bool
         Bodies of mass 0 and inertia 0.
+    sums : bool
+        Couplings of more than two coordinates.
     """
 
     joints: Collection[str] = ()
@@ -81,6 +84,7 @@ class Supports:
     armatures: Collection[str] = ()
     over_time: Collection[str] = ()
     massless_links: bool = False
+    sums: bool = False
 
     def missing(self, scene: Scene) -> Cannot | None:
         """Return the refusal of the first joint, coupling, driver or load that is not declared.
@@ -123,6 +127,8 @@ class Supports:
         for coupling in scene.coupling:
             if coupling.offset:
                 yield f"coupling {coupling.name!r} has an offset (mbref.assembled(scene) has none)"
+            if len(coupling.joints) > MOST_COUPLED and not self.sums:
+                yield f"coupling {coupling.name!r} sums {len(coupling.joints)} coordinates"
             for joint, kind in scene.coupled(coupling):
                 if kind not in self.couplings:
                     yield f"coupling {coupling.name!r} couples the {kind} of joint {joint.name!r}"

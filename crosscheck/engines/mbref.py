@@ -80,6 +80,7 @@ class Mbref(Engine):
         armatures=get_args(Coordinate),
         over_time=(TABLE, FACTOR),
         massless_links=True,
+        sums=True,
     )
 
     def version(self) -> str:

@@ -96,7 +96,7 @@ def coupling_gaps(
     angular_velocity: np.ndarray,
     counts: Mapping[str, np.ndarray] | None = None,
 ) -> Residuals:
-    """Return position residuals (k, 1) of couplings by name, q₂ - offset - ratio q₁ in m or rad, with the
+    """Return position residuals (k, 1) of couplings by name, Σ factor · q - offset in m or rad, with the
     arguments of ``joint_coordinates``.
 
     The residuals are NaN from the first sample on at which the samples are too far apart to count turns.
@@ -107,16 +107,17 @@ def coupling_gaps(
 
 
 def _coupled(scene: Scene, of_joint: Callable[[JointFrames], np.ndarray]) -> Residuals:
-    """Return q₂ - ratio q₁ (…, 1) of each coupling, from both coordinates (…, 2) of every joint, or from
-    their rates."""
+    """Return Σ factor · q (…, 1) of each coupling, q₂ - ratio q₁ of two joints, from both coordinates (…, 2)
+    of every joint, or from their rates."""
     joints = {joint.name: joint for joint in joint_residuals.joint_frames(scene)}
     found: Residuals = {}
     for coupling in scene.coupling:
-        first, second = (
-            of_joint(joints[joint.name])[..., COORDINATES.index(coordinate)]
-            for joint, coordinate in scene.coupled(coupling)
-        )
-        found[coupling.name] = (second - coupling.ratio * first)[..., None]
+        ends = zip(scene.coupled(coupling), coupling.factors, strict=True)
+        terms = [
+            factor * of_joint(joints[joint.name])[..., COORDINATES.index(coordinate)]
+            for (joint, coordinate), factor in ends
+        ]
+        found[coupling.name] = sum(terms[1:], terms[0])[..., None]
     return found
 
 
@@ -124,7 +125,7 @@ def length_rows(scene: Scene) -> dict[str, np.ndarray]:
     """Return masks (rows,) of the residuals by name of joint or coupling: True for lengths (m), False for
     angles (rad)."""
     found = {joint.name: joint_residuals.are_lengths(joint) for joint in joint_residuals.joint_frames(scene)}
-    ends = {coupling.name: scene.coupled(coupling)[1][1] for coupling in scene.coupling}
+    ends = {coupling.name: scene.coupled(coupling)[-1][1] for coupling in scene.coupling}
     return found | {name: np.array([coordinate == DISPLACEMENT]) for name, coordinate in ends.items()}
 
 

@@ -78,8 +78,8 @@ def _residual(scene: Scene, start: Pose, pose: Pose, time: float) -> np.ndarray:
     moved = {n: [wrapped(after[n][0] - before[n][0]), after[n][1] - before[n][1]] for n in after}
     gaps = []
     for coupling in scene.coupling:
-        first, second = (moved[joint.name][kind == DISPLACEMENT] for joint, kind in scene.coupled(coupling))
-        gaps.append(second - coupling.ratio * first)
+        ends = zip(scene.coupled(coupling), coupling.factors, strict=True)
+        gaps.append(sum(factor * moved[joint.name][kind == DISPLACEMENT] for (joint, kind), factor in ends))
     return np.concatenate([*(of_joints[joint.name] for joint in scene.joint), gaps])
 
 

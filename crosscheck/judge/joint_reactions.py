@@ -103,7 +103,7 @@ def of_multipliers(
     """Return for every joint the wrenches (6, rows) on its second body, at its anchor, of unit multipliers of
     all rows of `jacobian`.
 
-    A coupling acts along the coordinates of both its joints.
+    A coupling acts along the coordinates of its joints.
     """
     start = 0
     for joint in scene.joint:
@@ -113,9 +113,7 @@ def of_multipliers(
         start = stop
         first = len(rows) - len(scene.coupling)
         for k, coupling in enumerate(scene.coupling, first):
-            for factor, (other, coordinate) in zip(
-                (-coupling.ratio, 1.0), scene.coupled(coupling), strict=True
-            ):
+            for factor, (other, coordinate) in zip(coupling.factors, scene.coupled(coupling), strict=True):
                 if other.name == joint.name:
                     found[:, k] += factor * along_coordinate(scene, joint, coordinate, position, orientation)
         yield joint, found

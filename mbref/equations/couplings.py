@@ -12,17 +12,17 @@ from typing import Any, NamedTuple
 
 from mbref.equations.joints import AXES, ORIGIN, Primitive, of_coordinate
 from mbref.kernels.scene_layout import COUPLED_ANGLE, COUPLED_SLIDE
-from mbref.scene import Body, Joint, Revolute, Scene, Translational
+from mbref.scene import Body, Coupling, Joint, Revolute, Scene, Translational
 from mbref.scene.joints import ANGLE, Coordinate
 
 
 class Coupled(NamedTuple):
-    """A row: the sum of two joint coordinates times factors is zero."""
+    """A row: the sum of joint coordinates times factors is zero."""
 
     name: str
-    joints: tuple[Joint, Joint]
-    coordinates: tuple[Coordinate, Coordinate]
-    factors: tuple[float, float]
+    joints: tuple[Joint, ...]
+    coordinates: tuple[Coordinate, ...]
+    factors: tuple[float, ...]
 
 
 class Rotors(NamedTuple):
@@ -77,21 +77,25 @@ def _rotor(joint: Joint, name: str, frame: str, length: float) -> tuple[Body, Jo
 
 
 def couplings_of(scene: Scene) -> tuple[Coupled, ...]:
-    """Return the couplings of a scene, q₂ - ratio · q₁ = 0, scaled such that no factor is above one."""
+    """Return the couplings of a scene, scaled such that the largest factor is one in size."""
     if not scene.coupling:
         return ()
     found, joints = [], {joint.name: joint for joint in scene.joint}
     for coupling in scene.coupling:
-        named = joints[coupling.joints[0]], joints[coupling.joints[1]]
-        (first, one), (second, other) = coupling.pairs(named)
-        largest = max(1.0, abs(coupling.ratio))
-        factors = -coupling.ratio / largest, 1.0 / largest
-        found.append(Coupled(coupling.name, (first, second), (one, other), factors))
+        ends = coupling.ends(tuple(joints[name] for name in coupling.joints))
+        size = largest_factor(coupling)
+        named, coordinates = zip(*ends, strict=True)
+        factors = tuple(factor / size for factor in coupling.factors)
+        found.append(Coupled(coupling.name, named, coordinates, factors))
     return tuple(found)
 
 
-def coordinate_primitives(coupled: Coupled) -> tuple[Primitive, Primitive]:
-    """Return the two primitives of a coupling, which share one row."""
-    kinds, pairs = (COUPLED_ANGLE, COUPLED_SLIDE), zip(*coupled[1:], strict=True)
-    first, second = (of_coordinate(joint, name, kinds, factor) for joint, name, factor in pairs)
-    return first, second
+def largest_factor(coupling: Coupling) -> float:
+    """Return the size of the largest factor of a coupling, by which its row is divided."""
+    return max(map(abs, coupling.factors))
+
+
+def coordinate_primitives(coupled: Coupled) -> tuple[Primitive, ...]:
+    """Return the primitives of a coupling, which share one row."""
+    kinds, ends = (COUPLED_ANGLE, COUPLED_SLIDE), zip(*coupled[1:], strict=True)
+    return tuple(of_coordinate(joint, name, kinds, factor) for joint, name, factor in ends)

@@ -19,14 +19,14 @@ from mbref.scene import Scene, SceneError
 COMPARED_TIMES = 101  # least number of times over the motion at which drivers are compared
 MOST_TIMES = 1000  # largest number; of a longer motion its begin is compared
 EVEN_TIMES = 10_001  # number of times between which the way of drivers is measured
-GOLDEN = (5**0.5 - 1) / 2  # its multiples are nowhere even
-PACE = 0.4  # largest motion of a driver between compared times, lengths or rad: Newton's method follows it
+GOLDEN_RATIO = (5**0.5 - 1) / 2  # its multiples are nowhere even
+LARGEST_MOTION = 0.4  # of a driver between compared times, lengths or rad: Newton's method follows it
 # singular value of unit rows / largest one, below which a combination of rows vanishes
 DEPENDENT_DRIVER = 1e-9
 DRIVER_WEIGHT = 1e-6  # weight of a driver's row in such a combination above which the driver takes part
 # difference of the motions of drivers, lengths of the mechanism or rad, that is no rounding
 CONFLICT = 1e-9
-ROUNDED = 1e-15  # the same, over the largest value of a driver
+ROUNDED_VALUE = 1e-15  # the same, over the largest value of a driver
 RATE_CONFLICT = 5e-11  # difference of rates over the largest rate of a driver that is no rounding
 RATE_SHARE = 2e-10  # the same over 1/duration: tables of 13 digits differ by less
 MOST_DRIVER_ROWS = 300  # constraint rows; of larger mechanisms singular values take too long
@@ -111,12 +111,12 @@ def _compared(model: Model, until: float) -> tuple[np.ndarray, _Limits]:
     even = np.linspace(0.0, until, EVEN_TIMES)
     values = _driven_way(model.scene, model.length, even)
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(values)).max(axis=0))])
-    paced = np.interp(np.arange(0.0, way[-1], PACE)[:MOST_TIMES], way, even)
+    paced = np.interp(np.arange(0.0, way[-1], LARGEST_MOTION)[:MOST_TIMES], way, even)
     places = np.arange(COMPARED_TIMES - 1)
-    shifted = until * (places + 0.8 * (places * GOLDEN % 1.0)) / (COMPARED_TIMES - 1)
+    shifted = until * (places + 0.8 * (places * GOLDEN_RATIO % 1.0)) / (COMPARED_TIMES - 1)
     rows = [t for driver in model.scene.driver for t, _ in driver.table or () if 0.0 < t < until]
     times = np.unique(np.concatenate([shifted, paced, rows, [until]]))[:MOST_TIMES]
-    gap = max(CONFLICT, ROUNDED * np.abs(values).max())
+    gap = max(CONFLICT, ROUNDED_VALUE * np.abs(values).max())
     rate = RATE_CONFLICT * fastest_rate(model.scene, model.length, until) + RATE_SHARE / (until or np.inf)
     return times, _Limits(gap, rate)
 

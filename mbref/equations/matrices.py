@@ -16,6 +16,7 @@ import numpy as np
 from mbref import rotations
 from mbref.equations.joints import ROWS_OF
 from mbref.equations.model import Model
+from mbref.equations.structure import LAST_PART
 from mbref.equations.units import row_lengths
 from mbref.kernels.scene_layout import COUPLED_ANGLE, COUPLED_SLIDE, DISTANCE, DOT1, DOT2, POINT
 
@@ -213,7 +214,7 @@ def _labels(model: Model) -> dict[str, tuple[str, ...]]:
     units: list[str] = []
     for place in model.structure.places.primitives:
         word = "driver" if place.driver >= 0 else ROW_WORDS.get(place.kind, "coupling")
-        count = ROWS_OF[place.kind] * (place.part != 1)
+        count = ROWS_OF[place.kind] * (place.part in (0, LAST_PART))
         axes = (" x", " y", " z") if count > 1 else ("",)
         words += [f"{place.joint}: {word}{axis}" for axis in axes[:count]]
         units += [ROW_UNITS[place.kind]] * count

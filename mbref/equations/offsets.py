@@ -6,6 +6,7 @@ import functools
 
 import numpy as np
 
+from mbref.equations.couplings import largest_factor
 from mbref.equations.gaps import gaps
 from mbref.equations.initial_state import solve_positions
 from mbref.equations.joint_angles import angles_by_joint, angles_of_pose
@@ -85,7 +86,7 @@ def counted_angles(scene: Scene, structure: Structure, angles: np.ndarray) -> di
 @functools.lru_cache(maxsize=64)
 def _at_offsets(scene: Scene) -> tuple[Scene, dict[str, float]]:
     """Return the scene at poses that obey its offsets, and the angles of joints from the given poses."""
-    offsets = {c.name: c.offset / max(1.0, abs(c.ratio)) for c in scene.coupling}
+    offsets = {c.name: c.offset / largest_factor(c) for c in scene.coupling}
     found = scene.with_(coupling=[c.model_copy(update={"offset": 0.0}) for c in scene.coupling])
     angles = {joint.name: 0.0 for joint in scene.joint if joint.facts.turns}
     value = np.array([offsets.get(name, 0.0) for name in Model(found).row_joint])

@@ -34,6 +34,7 @@ from mbref.equations.structure import (
     PrimitivePlace,
     Structure,
     TurningPlace,
+    parts_of_row,
     structure_of,
 )
 from mbref.equations.units import body_lengths, inverse_root, metric
@@ -169,11 +170,11 @@ class Packs:
         )
 
     def _of_couplings(self, primitives: Sequence[tuple[Primitive, ...]]) -> Iterator[PrimitivePlace]:
-        """Return the joint coordinates of the first scene's couplings, two for each row."""
-        for coupling, pair in zip(self._coupled[0], primitives, strict=True):
-            for k, (joint, p) in enumerate(zip(coupling.joints, pair, strict=True)):
+        """Return the joint coordinates of the first scene's couplings, which share a row."""
+        for coupling, found in zip(self._coupled[0], primitives, strict=True):
+            for part, joint, p in zip(parts_of_row(len(found)), coupling.joints, found, strict=True):
                 first, second = map(self.index.__getitem__, joint.bodies)
-                yield PrimitivePlace(p.kind, coupling.name, first, second, -1, k + 1, joint.name)
+                yield PrimitivePlace(p.kind, coupling.name, first, second, -1, part, joint.name)
 
     def _all(self, array: np.ndarray) -> np.ndarray:
         """Return an array that is equal for all scenes."""

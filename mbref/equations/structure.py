@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 MOST_KEPT = 256  # largest number of cached structures
+FIRST_PART, LAST_PART, INNER_PART = 1, 2, 3  # places of joint coordinates in the row of a coupling
 
 
 class PrimitivePlace(NamedTuple):
@@ -31,7 +32,7 @@ class PrimitivePlace(NamedTuple):
     first: int  # index of the first body
     second: int
     driver: int  # index of the driver, -1 without
-    part: int = 0  # 1 or 2: which of the two joint coordinates in the row of a coupling; 0 otherwise
+    part: int = 0  # FIRST_PART, INNER_PART or LAST_PART of a row of joint coordinates; 0 otherwise
     of: str = ""  # name of the joint to which the coordinate belongs
 
 
@@ -86,7 +87,7 @@ class Structure:
     driver: np.ndarray  # (p,) drivers, -1 without
     row: np.ndarray  # (p,) first row of each primitive
     places_in_row: np.ndarray  # (4, p) fields begins, column_first, column_second, angle of ``Primitives``
-    sides: int  # bodies of a row: 2, or 4 if joint coordinates are coupled
+    sides: int  # bodies of a row: 2, or 4 and more if joint coordinates are coupled
     row_bodies: np.ndarray  # (m, sides), padded with the fixed frame
     entry_columns: np.ndarray  # (m, width)
     row_joint: tuple[str, ...]  # (m,) names of the joints
@@ -190,16 +191,20 @@ def structure_of(places: Places) -> Structure:
         np.array([place[k] for place in primitives], dtype=np.int64) for k in (0, 2, 3, 4)
     )
     load = np.array(places.loads, dtype=np.int64).reshape(-1, 5).T.copy()
-    rows = np.array([ROWS_OF[place.kind] * (place.part != 1) for place in primitives], dtype=np.int64)
+    rows = np.array(
+        [ROWS_OF[place.kind] * (place.part in (0, LAST_PART)) for place in primitives], dtype=np.int64
+    )
     coupled, columns = _coupled_bodies(places)
-    sides = 4 if coupled else 2
+    sides = max([2, *map(len, coupled)])
     row_bodies = np.full((rows.sum(), sides), nb, dtype=np.int64)
     row_bodies[:, :2] = np.repeat(np.stack([first, second], axis=1), rows, axis=0)
-    for bodies, row in zip(coupled, np.cumsum(rows)[[p.part == 2 for p in primitives]] - 1, strict=True):
-        row_bodies[row] = bodies
+    for bodies, row in zip(
+        coupled, np.cumsum(rows)[[p.part == LAST_PART for p in primitives]] - 1, strict=True
+    ):
+        row_bodies[row, : len(bodies)] = bodies
     turning = {place.joint: k for k, place in enumerate(places.turning)}
     slots = [turning[place.of] if place.kind == COUPLED_ANGLE else -1 for place in primitives]
-    begins = np.array([place.part != 2 for place in primitives], dtype=np.int64)
+    begins = np.array([place.part in (0, FIRST_PART) for place in primitives], dtype=np.int64)
     return Structure(
         nb=nb,
         kind=kind,
@@ -227,16 +232,22 @@ def structure_of(places: Places) -> Structure:
     )  # fmt: skip
 
 
+def parts_of_row(count: int) -> list[int]:
+    """Return the parts of the joint coordinates in the row of a coupling."""
+    return [FIRST_PART, *[INNER_PART] * (count - 2), LAST_PART]
+
+
 def _coupled_bodies(places: Places) -> tuple[list[list[int]], tuple[list[int], list[int]]]:
-    """Return the four bodies of each coupling, padded with the fixed frame; and the positions in a row of the
-    columns of each primitive's first and second body."""
+    """Return the bodies of each coupling, four or more, padded with the fixed frame; and the positions in a
+    row of the columns of each primitive's first and second body."""
     coupled: list[list[int]] = []
     columns: tuple[list[int], list[int]] = [], []
-    ahead = [*places.primitives, None][1:]
     bodies: list[int] = []
-    for place, other in zip(places.primitives, ahead, strict=True):
-        if place.part == 1 and other is not None:
-            bodies = list(dict.fromkeys((place.first, place.second, other.first, other.second)))
+    for k, place in enumerate(places.primitives):
+        if place.part == FIRST_PART:
+            stop = next(j for j, p in enumerate(places.primitives[k:], k) if p.part == LAST_PART) + 1
+            row = places.primitives[k:stop]
+            bodies = list(dict.fromkeys(body for p in row for body in (p.first, p.second)))
             coupled.append(bodies + [places.nb] * (4 - len(bodies)))
         ends = (place.first, place.second)
         found = [6 * bodies.index(body) for body in ends] if place.part else [0, 6]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbref import rotations
+from mbref.equations.couplings import largest_factor
 from mbref.motions.joint_motion import (
     acceleration_of,
     angular_acceleration_of,
@@ -35,10 +36,9 @@ def driving_forces(scene: Scene, motion: Trajectory) -> dict[str, np.ndarray]:
     driven = [scene.joint_named(driver.joint) for driver in scene.driver]
     unknown = [{(joint.name, joint.facts.driven): 1.0} for joint in driven]
     for coupling in scene.coupling:
-        (first, one), (second, other) = scene.coupled(coupling)
-        size, shares = max(1.0, abs(coupling.ratio)), {(second.name, other): 1.0}
-        shares[first.name, one] = shares.get((first.name, one), 0.0) - coupling.ratio
-        unknown.append({coordinate: share / size for coordinate, share in shares.items()})
+        ends = zip(scene.coupled(coupling), coupling.factors, strict=True)
+        size = largest_factor(coupling)
+        unknown.append({(joint.name, kind): factor / size for (joint, kind), factor in ends})
     coordinates = list(dict.fromkeys(coordinate for shares in unknown for coordinate in shares))
     found = [_demanded(scene, motion, scene.joint_named(name), kind or ANGLE) for name, kind in coordinates]
     if any(each is None for each in found) or not driven:

@@ -190,7 +190,7 @@ class EntryType(ModelType):
         try:
             return super().__call__(*values, **fields)
         except ValidationError as error:
-            raise EntryType.refusal(error, cls.model_fields) from None
+            raise EntryType.refusal(error, getattr(cls, "model_fields", ())) from None
 
 
 class SceneEntry(BaseModel, metaclass=EntryType):

@@ -12,7 +12,7 @@ from mbref.scene.scene import Scene
 # By halving the intervals the error of a spline's value falls to 1/16, of its second derivative to 1/4
 OF_VALUE, OF_SECOND = 1 / 15, 1 / 3  # error / difference of both splines
 LEAST_SHOWN = 1e-9  # error / largest value, below which it is rounding
-SAMPLES = 8  # points between two rows
+BETWEEN_ROWS = 8  # points between two rows
 
 
 def interpolation_notes(scene: Scene) -> Iterator[str]:
@@ -54,7 +54,7 @@ def interpolation_error(function: TimeFunction, derivative: int = 0) -> tuple[fl
         return np.nan, np.nan
     ends = "periodic" if function.periodic else "not-a-knot"
     fine, coarse = (CubicSpline(times[rows], values[rows], bc_type=ends) for rows in (slice(None), kept))
-    t = np.unique(np.linspace(times[:-1], times[1:], SAMPLES))
+    t = np.unique(np.linspace(times[:-1], times[1:], BETWEEN_ROWS))
     found = fine(t, derivative)
     share = OF_SECOND if derivative else OF_VALUE
     return share * float(np.abs(found - coarse(t, derivative)).max()), float(np.abs(found).max())

@@ -4,10 +4,11 @@ types follow."""
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
-from pydantic import Discriminator, field_validator
+from pydantic import BeforeValidator, Discriminator, field_validator
 
 from mbref.scene.fields import (
     LengthOrAngle,
@@ -21,15 +22,16 @@ from mbref.scene.fields import (
     SceneEntry,
     VectorPair,
     VectorValue,
+    as_list,
     checked_length,
     direction,
+    shown,
 )
 
 X, Y, Z = 0, 1, 2
 SKEW = 0.05  # largest cosine between the axes of a universal joint that counts as a rounded right angle
 RIGHT_ANGLE = 1e-15  # largest cosine between axes that are perpendicular up to rounding
 Coordinate = Literal["angle", "displacement"]
-CoordinatePair = tuple[Coordinate, Coordinate]
 ANGLE: Coordinate = "angle"
 DISPLACEMENT: Coordinate = "displacement"
 Condition = Literal["perpendicular axes", "constant distance"]
@@ -251,40 +253,64 @@ JOINT_TYPES: dict[str, type[Joint]] = {
 
 
 class Coupling(SceneEntry):
-    """q₂ = offset + ratio · q₁ of two joint coordinates: gears, racks, belts, screws, mimic joints.
+    """q₂ = offset + ratio · q₁ of two joint coordinates, or Σ ratios[k] q_k = offset of two or more: gears,
+    racks, belts, screws, mimic joints; differentials, pulleys, planetary gears.
 
     A coordinate is the angle about a joint's axis (rad, full turns counted) or the displacement along it (m),
-    of the second body relative to the first. Both coordinates are zero at the poses that the scene gives;
+    of the second body relative to the first. All coordinates are zero at the poses that the scene gives;
     with an ``offset`` the motion starts at other poses (see ``Scene.assembled``). ``coordinates`` names the
     coordinate of each joint. The default is the only coordinate of the joint, or the angle of a cylindrical
     joint; for one joint named twice, its angle and its displacement.
     """
 
     name: Name
-    joints: Pair
-    ratio: Measure  # rad/rad, m/rad, rad/m or m/m
-    offset: LengthOrAngle = 0.0  # rad or m, of the second coordinate
-    coordinates: CoordinatePair | None = None
+    joints: Annotated[tuple[Name, ...], BeforeValidator(as_list)]
+    ratio: Measure | None = None  # rad/rad, m/rad, rad/m or m/m
+    ratios: Annotated[tuple[Measure, ...], BeforeValidator(as_list)] | None = None  # over the last coordinate
+    offset: LengthOrAngle = 0.0  # rad or m, of the last coordinate
+    coordinates: Annotated[tuple[Coordinate, ...], BeforeValidator(as_list)] | None = None
 
-    @field_validator("ratio")
+    @field_validator("joints")
     @classmethod
-    def _ratio_is_not_zero(cls, ratio: float) -> float:
-        if ratio == 0.0:
-            raise ValueError("must not be 0, which would lock the second joint")
-        checked_length(abs(ratio))
-        return ratio
+    def _joints_are_several(cls, joints: tuple[str, ...]) -> tuple[str, ...]:
+        if len(joints) < 2:
+            raise ValueError(f"must be two or more names of joints, got {shown(list(joints))}")
+        return joints
 
-    def pairs(self, joints: tuple[Joint, Joint]) -> tuple[tuple[Joint, Coordinate], ...]:
-        """Return both joints, each with its coupled coordinate."""
-        facts = joints[0].facts, joints[1].facts
-        chosen = self.coordinates or default_coordinates(facts, self.joints[0] == self.joints[1])
+    @field_validator("ratio", "ratios")
+    @classmethod
+    def _no_ratio_is_zero(cls, value: Any) -> Any:
+        for ratio in value if isinstance(value, tuple) else () if value is None else (value,):
+            if ratio == 0.0:
+                last = "would lock the second joint" if value == 0.0 else "would leave out its joint"
+                raise ValueError(f"must not be 0, which {last}")
+            checked_length(abs(ratio))
+        return value
+
+    @property
+    def factors(self) -> tuple[float, ...]:
+        """Factors of the joint coordinates, whose sum is the offset: ``ratios``, or (-ratio, 1)."""
+        return self.ratios or (-(self.ratio or 0.0), 1.0)
+
+    @property
+    def gear_ratio(self) -> float:
+        """Ratio r of a coupling of two joints, q₂ = offset + r · q₁."""
+        first, second = self.factors
+        return -first / second
+
+    def ends(self, joints: tuple[Joint, ...]) -> tuple[tuple[Joint, Coordinate], ...]:
+        """Return the joints, each with its coupled coordinate."""
+        chosen = self.coordinates or default_coordinates(self.joints, [joint.facts for joint in joints])
         return tuple(zip(joints, chosen, strict=True))
 
 
-def default_coordinates(facts: tuple[JointFacts, JointFacts], of_one: bool) -> CoordinatePair:
-    """Return the default coordinates of a coupling of two joints, or of one joint named twice
-    (``of_one``)."""
-    if of_one:
-        return ANGLE, DISPLACEMENT
-    first, second = (each.driven or (*each.coordinates, ANGLE)[0] for each in facts)
-    return first, second
+def default_coordinates(names: Sequence[str], facts: Sequence[JointFacts]) -> tuple[Coordinate, ...]:
+    """Return the default coordinates of a coupling of joints with these names and facts: for a joint that is
+    named twice its angle, then its displacement."""
+    found: list[Coordinate] = []
+    for k, (name, each) in enumerate(zip(names, facts, strict=True)):
+        if list(names).count(name) > 1:
+            found.append(DISPLACEMENT if name in names[:k] else ANGLE)
+        else:
+            found.append(each.driven or (*each.coordinates, ANGLE)[0])
+    return tuple(found)

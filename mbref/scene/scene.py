@@ -40,7 +40,7 @@ class Scene(SceneEntry):
     joint : tuple of Joint
         Joints between two bodies, or a body and ``"ground"``.
     coupling : tuple of Coupling
-        Linear relations of two joint coordinates.
+        Linear relations of joint coordinates.
     driver : tuple of Driver
         Prescribed motions of joints.
     load : tuple of Load
@@ -128,7 +128,7 @@ class Scene(SceneEntry):
         raise KeyError(name)
 
     def coupled(self, coupling: Coupling) -> tuple[tuple[Joint, Coordinate], ...]:
-        """Return both joints of a coupling, each with its coupled coordinate.
+        """Return the joints of a coupling, each with its coupled coordinate.
 
         Parameters
         ----------
@@ -138,10 +138,9 @@ class Scene(SceneEntry):
         Returns
         -------
         tuple of (Joint, str)
-            Two pairs of a joint and ``"angle"`` (rad) or ``"displacement"`` (m).
+            Pairs of a joint and ``"angle"`` (rad) or ``"displacement"`` (m), in the order of ``factors``.
         """
-        first, second = map(self.joint_named, coupling.joints)
-        return coupling.pairs((first, second))
+        return coupling.ends(tuple(map(self.joint_named, coupling.joints)))
 
     def has_mass(self) -> bool:
         """Return whether every body has mass and inertia, as a dynamic analysis needs."""

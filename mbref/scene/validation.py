@@ -5,18 +5,18 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
 from mbref.printable import printable
+from mbref.scene.coupling_faults import coordinate_faults, count_faults
 from mbref.scene.fields import checked_length, checked_size, field_of, is_some, meant, shown
-from mbref.scene.function_faults import QUANTITY_OF, Faults, factor_faults, listed, table_faults, unit_faults
-from mbref.scene.joints import JOINT_TYPES, Coordinate, default_coordinates
+from mbref.scene.function_faults import Faults, factor_faults, listed, table_faults, unit_faults
+from mbref.scene.joints import JOINT_TYPES
 from mbref.scene.loads import LOAD_TYPES, JointLoad
 from mbref.scene.shapes import SHAPE_TYPES
-from mbref.scene.units import QUANTITIES, dimension_of, fits, unit
 
 GROUND = "ground"
 RESERVED = (GROUND, "the fixed frame")  # names that no body can have
@@ -27,7 +27,6 @@ LOADED = {  # load type → joint types along whose coordinate it can act
     if issubclass(load, JointLoad)
 }
 COUPLED = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.coordinates)
-COORDINATES = get_args(Coordinate)
 ACTS_ON = {name: load.acts_on for name, load in LOAD_TYPES.items()}
 NUMBERS = {  # field → content of its list; all other lists contain three numbers
     "orientation": "four numbers (w, x, y, z), for an angle φ about z cos(φ/2), 0, 0, sin(φ/2)",
@@ -38,8 +37,9 @@ NUMBERS = {  # field → content of its list; all other lists contain three numb
     "axes": "two axes of three numbers each",
     "points": "two points of three numbers each",
     **{key: f"entries [[{key}]]" for key in ("body", "joint", "coupling", "driver", "load")},
-    "joints": "two names of joints",
-    "coordinates": 'two of "angle" and "displacement"',
+    "joints": "two or more names of joints",
+    "coordinates": 'a list of "angle" and "displacement"',
+    "ratios": "numbers, one for each joint",
 }
 INERTIA_TOLERANCE = 1e-9  # relative, of the triangle inequality: equality holds for thin rods
 
@@ -244,40 +244,16 @@ def _coupling_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Fault
     for i, coupling in enumerate(couplings):
         if (own := _text(coupling, "name")) and own in types:
             yield f"coupling[{i}].name", f"{own!r} is already the name of a joint"
-        names = field_of(coupling, "joints")
-        if not isinstance(names, list | tuple) or len(names) != 2:
+        names = listed(field_of(coupling, "joints"))
+        if len(names) < 2:
             continue  # already reported as a fault of the field
         path = f"coupling[{i}].joints"
         for k, name in enumerate(names):
             yield from _joint_faults(f"{path}[{k}]", name, types, COUPLED, "be coupled")
         if all(isinstance(name, str) and types.get(name) in COUPLED for name in names):
-            yield from _coordinate_faults(path, coupling, names, types)
-
-
-def _coordinate_faults(path: str, coupling: Any, names: Sequence[str], types: Mapping[str, str]) -> Faults:
-    """Yield coupled coordinates that joints of these types lack, or that are equal."""
-    first, second = (JOINT_TYPES[types[name]].facts for name in names)
-    asked = field_of(coupling, "coordinates")
-    given = isinstance(asked, list | tuple) and len(asked) == 2
-    chosen = asked if given else default_coordinates((first, second), names[0] == names[1])
-    for name, facts, coordinate in zip(names, (first, second), chosen, strict=True):
-        if coordinate in COORDINATES and coordinate not in facts.coordinates:
-            yield path, f"{name!r} is {types[name]}, which has no {coordinate} to be coupled"
-            return
-    if names[0] == names[1] and chosen[0] == chosen[1]:
-        yield path, f"must be two different coordinates, got the {chosen[0]} of {names[0]!r} twice"
-    if not set(chosen) <= set(COORDINATES):
-        return  # already reported as a fault of the field
-    entry, offset, ratio = (
-        path.removesuffix("joints"),
-        field_of(coupling, "offset"),
-        field_of(coupling, "ratio"),
-    )
-    if not fits(offset, QUANTITY_OF[chosen[1]]):
-        yield f"{entry}offset", f"is of the {chosen[1]} of {names[1]!r}, got {offset!r}"
-    first_unit, second_unit = (QUANTITIES[QUANTITY_OF[coordinate]][0] for coordinate in chosen)
-    if dimension_of(ratio) not in (None, unit(f"{second_unit}/{first_unit}").dimension):
-        yield f"{entry}ratio", f"is in {second_unit}/{first_unit}, got {ratio!r}"
+            yield from coordinate_faults(f"coupling[{i}]", coupling, names, types)
+        else:
+            yield from count_faults(f"coupling[{i}]", coupling, len(names))
 
 
 def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:

@@ -156,12 +156,14 @@ class NaturalCoordinates:
         In the unit of length the larger factor is 1.
         """
         primitives, found = self.model.data.primitives, []
-        for second in np.flatnonzero(primitives.begins == 0).tolist():
-            pair, polynomial = (second - 1, second), Polynomial()
-            factors = [scalar(primitives.length[p]) * self._unit(p) for p in pair]
+        coupled = np.flatnonzero(np.isin(primitives.kind, (COUPLED_ANGLE, COUPLED_SLIDE)))
+        begins = np.flatnonzero(primitives.begins[coupled])
+        for ends in np.split(coupled, begins[1:]) if coupled.size else ():
+            row, polynomial = ends.tolist(), Polynomial()
+            factors = [scalar(primitives.length[p]) * self._unit(p) for p in row]
             size = largest(factors)
             angles = []
-            for p, factor in zip(pair, factors, strict=True):
+            for p, factor in zip(row, factors, strict=True):
                 if primitives.kind[p] == COUPLED_ANGLE:
                     angles.append((p, factor / size))
                 else:

@@ -54,8 +54,8 @@ def test_coupling_takes_the_angle_of_a_joint_that_has_one_and_otherwise_the_disp
         ({"ratio": 0.0}, "coupling[teeth].ratio: must not be 0, which would lock the second joint"),
         ({"coordinates": ["angle", "displacement"]}, f"coupling[teeth].joints: 'B' {NO_SLIDE}"),
         ({"name": "A"}, "coupling[A].name: 'A' is already the name of a joint"),
-        ({"joints": ["A"]}, "coupling[teeth].joints: must be two names of joints, got ['A']"),
-        ({"ratios": 1.0}, "coupling[teeth].ratios: is not a known field; did you mean 'ratio'?"),
+        ({"joints": ["A"]}, "coupling[teeth].joints: must be two or more names of joints, got ['A']"),
+        ({"ratoi": 1.0}, "coupling[teeth].ratoi: is not a known field; did you mean 'ratio'?"),
     ],
 )
 def test_fault_of_a_coupling_is_named_by_its_field(change, fault):

@@ -71,10 +71,11 @@ def in_other_units(scene: Scene, length: float, time: float) -> Scene:
 
 def _coupled_in_lengths(scene: Scene, coupling: Coupling, length: float) -> Coupling:
     """Return a coupling whose displacements are multiplied by a length."""
-    first, second = (
-        length if coordinate == DISPLACEMENT else 1.0 for _, coordinate in scene.coupled(coupling)
-    )
-    return mapped(coupling, {"ratio": times(second / first), "offset": times(second)})
+    *_, last = sizes = [length if kind == DISPLACEMENT else 1.0 for _, kind in scene.coupled(coupling)]
+    if coupling.ratios is None:
+        return mapped(coupling, {"ratio": times(last / sizes[0]), "offset": times(last)})
+    ratios = tuple(last / size * ratio for size, ratio in zip(sizes, coupling.ratios, strict=True))
+    return mapped(coupling, {"ratios": lambda _: ratios, "offset": times(last)})
 
 
 def _slower(function: Function, amount: float, time: float) -> Function:

@@ -139,7 +139,7 @@ class Mechanism:
         """Couple the rates of two joints: PyBullet's gear keeps q₁' + (gear ratio) q₂' = 0."""
         first, second = (self.joints[i] for i in self.tree.coupled(self.scene, coupling))
         gear = self.p.createConstraint(*first, *second, self.p.JOINT_GEAR, [0.0, 0.0, 1.0], O, O)
-        self.p.changeConstraint(gear, gearRatio=-1 / coupling.ratio, maxForce=STRONGEST)
+        self.p.changeConstraint(gear, gearRatio=-1 / coupling.gear_ratio, maxForce=STRONGEST)
 
     def _end(self, link: int, point: np.ndarray) -> tuple[tuple[int, int], list[float]]:
         """Return multibody and link, and a point (world at t = 0) in the frame of the link's centre of

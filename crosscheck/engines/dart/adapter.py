@@ -59,7 +59,7 @@ class Dart(SteppingEngine):
     name = "dart"
     package = "dartpy"
     modules = ("dartpy",)
-    supports = replace(EVERYTHING, massless_links=True)
+    supports = replace(EVERYTHING, massless_links=True, sums=True)
     families, options, own_steps, default_steps = FAMILIES, OPTIONS, OWN_STEPS, DEFAULT_STEPS
     integrated_here, with_terms = (terms.FAMILY,), Mechanism
     defaults_of = (

@@ -59,7 +59,7 @@ class Mechanism:
             self._close(closure)
         for coupling in self.scene.coupling:
             first, second = (self.joints[i] for i in self.tree.coupled(self.scene, coupling))
-            self.plant.AddCouplerConstraint(second, first, coupling.ratio)
+            self.plant.AddCouplerConstraint(second, first, coupling.gear_ratio)
         for i, inertia in self.tree.armatures(self.scene):
             self.plant.AddJointActuator(str(i), self.joints[i]).set_default_rotor_inertia(inertia)
 

@@ -149,7 +149,7 @@ class _Parts:
             for joint, kind in self.scene.coupled(coupling)
         )
         constraint = self.items.ObjectConnectorCoordinate(
-            markerNumbers=[second, first], factor1=coupling.ratio
+            markerNumbers=[second, first], factor1=coupling.gear_ratio
         )
         return self.mbs.AddObject(constraint)
 

@@ -37,7 +37,7 @@ def reactions(
         joint = scene.joint_named(driver.joint)
         _push(scene, found[joint.name], joint, joint.facts.driven, turn, -forces[:, at + n])
     for n, coupling in enumerate(scene.coupling, at + len(scene.driver)):
-        for factor, (joint, kind) in zip((-coupling.ratio, 1.0), scene.coupled(coupling), strict=True):
+        for factor, (joint, kind) in zip(coupling.factors, scene.coupled(coupling), strict=True):
             _push(scene, found[joint.name], joint, kind, turn, factor * forces[:, n])
     rotors = [joint for joint in scene.joint if joint.reflected_inertia]
     for n, joint in enumerate(rotors, at + len(scene.driver) + len(scene.coupling)):

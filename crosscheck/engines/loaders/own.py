@@ -90,7 +90,7 @@ class Imported(Loaded):
         root = {body.name: body.name for body in self.scene.body} | {GROUND: GROUND}
         tree, loops = list[Joint](), list[Loop]()
         threads = [c for c in self.scene.coupling if c.joints[0] == c.joints[1]]
-        pitches = {c.joints[0]: 2 * math.pi * c.ratio for c in threads}
+        pitches = {c.joints[0]: 2 * math.pi * c.gear_ratio for c in threads}
 
         def end(name: str) -> str:
             return name if root[name] == name else end(root[name])
@@ -144,7 +144,8 @@ class Imported(Loaded):
         for coupling in self.scene.coupling:
             leader, follower = coupling.joints
             if leader != follower:  # the thread of a screw couples two coordinates of one joint
-                yield Coupling(coupling.name, follower, leader, coefficients(coupling.offset, coupling.ratio))
+                law = coefficients(coupling.offset, coupling.gear_ratio)
+                yield Coupling(coupling.name, follower, leader, law)
 
         for driver in self.scene.driver:
             yield Coupling(driver.joint, driver.joint, "", ())  # a joint that the file locks

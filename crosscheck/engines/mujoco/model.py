@@ -183,7 +183,7 @@ class _Builder:
         first, second = (self.joint[i].name for i in self.tree.coupled(self.scene, coupling))
         kind, objects = self.mujoco.mjtEq.mjEQ_JOINT, self.mujoco.mjtObj.mjOBJ_JOINT
         equality = self._equality(kind, objects, COUPLING + coupling.name, second, first)
-        equality.data[:5] = 0.0, coupling.ratio, 0.0, 0.0, 0.0
+        equality.data[:5] = 0.0, coupling.gear_ratio, 0.0, 0.0, 0.0
 
     def _equality(self, kind: Any, objects: Any, name: str, first: str, second: str) -> Any:
         return self.spec.add_equality(type=kind, objtype=objects, name=name, name1=first, name2=second)

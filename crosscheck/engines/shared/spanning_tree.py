@@ -140,7 +140,7 @@ class Tree:
         return [(self.coordinate(scene, driver.joint), driver) for driver in scene.driver]
 
     def coupled(self, scene: Scene, coupling: Coupling) -> list[int]:
-        """Return the indices of the two velocities that a coupling relates."""
+        """Return the indices of the velocities that a coupling relates."""
         return [self.coordinate(scene, joint.name, kind) for joint, kind in scene.coupled(coupling)]
 
     def armatures(self, scene: Scene) -> list[tuple[int, float]]:

@@ -119,12 +119,10 @@ class Simulation:
         self.integrator = Adaptive(self.rates, self.settled, *limits, self.counts)
 
     def _couplings(self) -> np.ndarray:
-        """Rows J (couplings, nv) of q₂ - ratio q₁ = 0."""
+        """Rows J (couplings, nv) of Σ factor · q = 0."""
         rows = np.zeros((len(self.scene.coupling), self.at.nv))
         for row, coupling in zip(rows, self.scene.coupling, strict=True):
-            for factor, i in zip(
-                (-coupling.ratio, 1.0), self.tree.coupled(self.scene, coupling), strict=True
-            ):
+            for factor, i in zip(coupling.factors, self.tree.coupled(self.scene, coupling), strict=True):
                 row[i] += factor
         return rows
 

@@ -32,6 +32,7 @@ SUPPORTS = Supports(
     drivers=("angle", "displacement"),
     loads=("moment", "force", "spring", "torsion_spring"),
     couplings=("angle", "displacement"),
+    sums=True,
     armatures=("angle", "displacement"),  # refused by the engine with a reason
 )
 UNLIMITED = 1e9  # rad or m; limit of a coordinate's range, which OpenSim requires
@@ -137,16 +138,19 @@ class Mechanism:
         return constraint
 
     def _couple(self, k: int, coupling: Coupling) -> None:
-        """Add q₂ = ratio q₁ as OpenSim's coupler."""
+        """Add the last coordinate as a linear function of the others, by OpenSim's coupler."""
         o = self.opensim
-        first, second = (self.coordinates[i].getName() for i in self.tree.coupled(self.scene, coupling))
-        names = o.ArrayStr()
-        names.append(first)
+        *others, last = (self.coordinates[i].getName() for i in self.tree.coupled(self.scene, coupling))
+        names, slopes = o.ArrayStr(), o.ArrayDouble()
+        for name, factor in zip(others, coupling.factors, strict=False):
+            names.append(name)
+            slopes.append(-factor / coupling.factors[-1])
+        slopes.append(0.0)
         coupler = o.CoordinateCouplerConstraint()
         coupler.setName(f"coupling{k}")
         coupler.setIndependentCoordinateNames(names)
-        coupler.setDependentCoordinateName(second)
-        coupler.setFunction(o.LinearFunction(coupling.ratio, 0.0))
+        coupler.setDependentCoordinateName(last)
+        coupler.setFunction(o.LinearFunction(slopes))
         self.model.addConstraint(coupler)
 
     def _drive(self, driver: Driver) -> None:

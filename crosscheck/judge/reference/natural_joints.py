@@ -181,8 +181,8 @@ class JointCoordinates:
         self.armatures = [self._armature(joint) for joint in geared]
 
     def _coupling(self, coupling: Any) -> Gear:
-        (first, one), (second, other) = self._of.scene.coupled(coupling)
-        pairs = [(self._number(first, one), -coupling.ratio), (self._number(second, other), 1.0)]
+        ends = zip(self._of.scene.coupled(coupling), coupling.factors, strict=True)
+        pairs = [(self._number(*end), factor) for end, factor in ends]
         units = [1.0 if self.forms[i].turns else self._of.length for i, _ in pairs]
         largest = max(abs(ratio) * unit for (_, ratio), unit in zip(pairs, units, strict=True))
         number = self._of.arithmetic.number

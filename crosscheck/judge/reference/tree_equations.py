@@ -63,9 +63,13 @@ class TreeEquations:
         at |= {key: self.tree.scalars + k for k, key in enumerate(away)}
         driven = [(str(scene.joint_named(d.joint).facts.driven), d.joint) for d in scene.driver]
         self.driven = np.array([at[key] for key in driven], dtype=int)
-        pairs = [[at[kind, joint.name] for joint, kind in scene.coupled(c)] for c in scene.coupling]
-        self.coupled = np.array(pairs, dtype=int).reshape(-1, 2).T
-        self.ratio = arithmetic.array([coupling.ratio for coupling in scene.coupling])
+        # of couplings, padded with coordinates of factor 0 where others sum more coordinates
+        ends = [[at[kind, joint.name] for joint, kind in scene.coupled(c)] for c in scene.coupling]
+        most = max(map(len, ends), default=2)
+        padded = [own + own[:1] * (most - len(own)) for own in ends]
+        self.coupled = np.array(padded, dtype=int).reshape(-1, most).T
+        factors = [(*c.factors, *[0.0] * (most - len(c.factors))) for c in scene.coupling]
+        self.factors = arithmetic.array(factors).reshape(-1, most).T
         self.loads = Loads(self.tree, at)
         self.nv = len(self.tree.axis)
         self.ends = np.cumsum([self.tree.scalars, 4 * len(self.tree.balls), len(away), self.nv])
@@ -81,8 +85,7 @@ class TreeEquations:
         rng, closing = np.random.default_rng(seed), self.closures.sizes(self.length)
         self._rate_sizes = np.where(self.tree.turning, 1.0, self.length)
         sizes = self._coordinate_sizes()
-        first, second = sizes[self.coupled]
-        coupled = np.maximum(second, np.abs(doubles(self.ratio)) * first)
+        coupled = (np.abs(doubles(self.factors)) * sizes[self.coupled]).max(axis=0)
         self._row_sizes = np.concatenate([closing, sizes[self.driven], coupled])
         self._weights = 1 + (PREFERENCE * rng.random(len(self._row_sizes)) if seed else 0.0)
         self._displaced = self.arithmetic.array(displaced * closing * rng.uniform(-1, 1, len(closing)))
@@ -135,14 +138,16 @@ class TreeEquations:
         return Instant(placed, coordinates, rows, np.concatenate(speed, axis=1), rate)
 
     def _coupled(self, coordinates: Rows) -> Rows:
-        """Return q₂ - ratio q₁ of the couplings."""
-        first, second = map(coordinates.among, self.coupled)
-        by_rate = self.ratio[:, None] * first.jacobian
-        return Rows(
-            second.value - self.ratio * first.value,
-            second.drift - self.ratio * first.drift,
-            second.jacobian - by_rate,
-        )
+        """Return the sums of the couplings' coordinates times their factors."""
+        rows = [coordinates.among(numbers) for numbers in self.coupled]
+        found = [
+            Rows(f * r.value, f * r.drift, f[:, None] * r.jacobian)
+            for f, r in zip(self.factors, rows, strict=True)
+        ]
+        total = found[0]
+        for each in found[1:]:
+            total = Rows(total.value + each.value, total.drift + each.drift, total.jacobian + each.jacobian)
+        return total
 
     def start(self) -> np.ndarray:
         """Return the state (n,) at t = 0 with the velocities of the documented rule; raises SceneError if the

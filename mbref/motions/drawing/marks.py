@@ -137,11 +137,11 @@ SIGNS = {
 
 
 def coupling_mark(stage: Stage, coupling: Coupling) -> str:
-    """Return a dotted line between both joints, which moves with them; a spiral for a joint coupled with
+    """Return a dotted line along the joints, which moves with them; a spiral for a joint coupled with
     itself."""
     joints = [stage.scene.joint_named(name) for name in coupling.joints]
     ends = [stage.place(joint.bodies[1], joint.anchor_pair[1]) for joint in joints]
-    if coupling.joints[0] == coupling.joints[1]:
+    if len(set(coupling.joints)) == 1:
         return svg.follow(ends[0], _spiral(INK), stage.timeline)
     look = f'stroke="{INK}" stroke-width="1.6" stroke-dasharray="1 5" stroke-linecap="round"'
     return stage.line(np.stack(ends, axis=1), look)

@@ -1,0 +1,192 @@
+"""Couplings that sum the coordinates of three and more joints: closed forms, the judge, engines, faults."""
+
+import numpy as np
+import pytest
+
+import mbref
+from crosscheck.engine import Setting, engine
+from crosscheck.judge.arithmetic import EXTENDED, doubles
+from crosscheck.judge.gauss_principle import gauss, stacked
+from crosscheck.judge.reference.taylor import natural_motion
+from crosscheck.judge.reference.tree import tree_motion
+from mbref import Scene, SceneError
+from tests.helpers.coupled_mechanisms import body
+from tests.helpers.parts import X, Y, Z, hinge, slide
+
+TIMES = np.linspace(0.0, 2.0, 9)
+INERTIAS, TORQUES = np.array([0.1, 0.3, 0.2]), np.array([0.3, 0.0, 2.0])  # kg m² and N m of A, B, C
+RATIOS = np.array([1.0, 1.0, -2.0])
+CLOSE = 1e-10  # rad and m of angles up to 20 rad
+
+
+def differential(**changes) -> Scene:
+    """Two shafts and the cage of a differential, on fixed axes: φ_A + φ_B = 2 φ_C."""
+    shafts = zip("abc", INERTIAS.tolist(), strict=True)
+    scene = {
+        "name": "differential",
+        "duration": 2.0,
+        "body": [body(name, 1.0, [inertia] * 3, (k, 0.0, 0.0)) for k, (name, inertia) in enumerate(shafts)],
+        "joint": [hinge(name.upper(), "ground", name, (k, 0.0, 0.0)) for k, name in enumerate("abc")],
+        "coupling": [{"name": "gears", "joints": ["A", "B", "C"], "ratios": RATIOS.tolist()}],
+        "load": [
+            {"type": "moment", "body": n, "moment": [0.0, 0.0, t]}
+            for n, t in zip("abc", TORQUES, strict=True)
+        ],
+    }
+    return Scene(**{**scene, **changes})
+
+
+def hoist() -> Scene:
+    """Two weights on a rope over a drum: x_A + x_C = r φ_B, r = 50 mm, a row in m as its last coordinate."""
+    return Scene(
+        name="hoist",
+        gravity=(0, -9.81, 0),
+        duration=1.0,
+        body=[
+            body("left", 3.0, [0.1] * 3, (-1.0, 0.0, 0.0)),
+            body("drum", 2.0, [0.02] * 3, (0.0, 1.0, 0.0)),
+            body("right", 1.0, [0.1] * 3, (1.0, 0.0, 0.0)),
+        ],
+        joint=[
+            slide("A", "ground", "left", (-1.0, 0.0, 0.0), Y),
+            hinge("B", "ground", "drum", (0.0, 1.0, 0.0), Z),
+            slide("C", "ground", "right", (1.0, 0.0, 0.0), Y),
+        ],
+        coupling=[{"name": "rope", "joints": ["A", "B", "C"], "ratios": [1.0, "-50 mm/rad", 1.0]}],
+    )
+
+
+CASES = {  # maker, masses and forces of the coordinates, ratios
+    "differential": (differential, INERTIAS, TORQUES, RATIOS),
+    "hoist": (hoist, np.array([3.0, 0.02, 1.0]), np.array([-29.43, 0.0, -9.81]), np.array([1.0, -0.05, 1.0])),
+}
+
+
+def accelerations(masses, forces, ratios):
+    """Return q̈ of m q̈ + ratios λ = f, Σ ratios q̈ = 0, and the forces -ratios λ of the coupling."""
+    share = (ratios * forces / masses).sum() / (ratios**2 / masses).sum()
+    return (forces - ratios * share) / masses, -ratios * share
+
+
+@pytest.mark.parametrize("method", ["taylor", "alf-dual+projection/dop853", "lm1+none"])
+@pytest.mark.parametrize("name", CASES)
+def test_coordinates_of_a_sum_move_by_their_closed_form(name, method):
+    """q̈ t² / 2, and the reactions contain the forces of the coupling along the coordinates."""
+    make, masses, forces, ratios = CASES[name]
+    scene = make()
+    motion = mbref.simulate(scene, method, TIMES, rtol=1e-12)
+    q, force = accelerations(masses, forces, ratios)
+    for k, (joint, kind) in enumerate(scene.coupled(scene.coupling[0])):
+        found = motion.joint(joint.name)
+        assert getattr(found, kind) == pytest.approx(q[k] * TIMES**2 / 2, abs=CLOSE)
+        along = found.moment[:, 2] if kind == "angle" else found.force[:, 1]
+        assert along == pytest.approx(force[k], rel=1e-9)
+    assert motion.violation.position.max() < 1e-9
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_both_formulations_of_the_reference_have_the_closed_form(name):
+    make, masses, forces, ratios = CASES[name]
+    scene, (q, _) = make(), accelerations(masses, forces, ratios)
+    for found in (
+        natural_motion(scene, TIMES, EXTENDED),
+        tree_motion(scene, TIMES, EXTENDED, seconds=100.0),
+    ):
+        assert not found.reason
+        position, p = doubles(found.position), doubles(found.orientation)
+        for k, (_, kind) in enumerate(scene.coupled(scene.coupling[0])):
+            half = q[k] * TIMES**2 / 4
+            if kind == "angle":
+                exact = np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
+                assert np.abs(np.abs((exact * p[:, k]).sum(axis=1)) - 1).max() < 1e-13
+            else:
+                assert position[:, k, 1] - position[0, k, 1] == pytest.approx(2 * half, abs=1e-13)
+
+
+def test_driven_shafts_of_a_differential_turn_its_cage_by_the_mean():
+    """3 t and -5 t turn the cage by -t, over full turns; the drivers carry the cage's torque of 2 N m."""
+    drivers = [{"joint": "A", "polynomial": [0.0, 3.0]}, {"joint": "B", "polynomial": [0.0, -5.0]}]
+    motion = mbref.simulate(differential(driver=drivers), times=TIMES * 5)
+    assert motion.joint("C").angle == pytest.approx(-5 * TIMES, abs=CLOSE)
+    assert motion.driver("A").torque == pytest.approx(-TORQUES[2] / 2 - TORQUES[0], abs=CLOSE)
+    assert motion.driver("B").torque == pytest.approx(-TORQUES[2] / 2, abs=CLOSE)
+
+
+def test_offset_of_a_sum_is_met_by_the_least_displacement():
+    """Least Σ I φ² with φ_A + φ_B - 2 φ_C = 0.03: φ = ratio / I times one number."""
+    scene = differential(load=[]).with_("coupling[gears].offset", "0.03 rad")
+    motion = mbref.simulate(scene, times=[0.0, 1.0])
+    found = np.array([motion.joint(n).angle[0] for n in "ABC"])
+    assert found @ RATIOS == pytest.approx(0.03, abs=1e-12)
+    assert found == pytest.approx(0.03 * RATIOS / INERTIAS / (RATIOS**2 / INERTIAS).sum(), rel=5e-3)
+
+
+def test_two_joints_with_ratios_move_as_with_their_ratio():
+    """-3 φ_A + 2 φ_C = 0 is φ_C = 1.5 φ_A."""
+    pair = {"name": "gears", "joints": ["A", "C"]}
+    one, other = (
+        mbref.simulate(differential(coupling=[{**pair, **ratio}]), times=TIMES)
+        for ratio in ({"ratios": [-3.0, 2.0]}, {"ratio": 1.5})
+    )
+    assert one.orientation == pytest.approx(other.orientation, abs=CLOSE)
+
+
+def test_sum_along_skew_axes_of_a_chain_has_the_judges_accelerations():
+    """Joints of moving bodies, an angle and displacements; Gauss's principle of the judge at the start."""
+    bodies = [body(name, 1.0, [0.1, 0.12, 0.14], (k + 0.3, 0.1 * k, 0.2)) for k, name in enumerate("abcd")]
+    joints = [
+        hinge("A", "ground", "a", (0.0, 0.0, 0.0), (0.0, 0.6, 0.8)),
+        slide("B", "a", "b", (1.0, 0.0, 0.0), (1.0, 0.0, 0.5), armature=0.3),
+        hinge("C", "b", "c", (2.0, 0.0, 0.0), (1.0, 1.0, 0.0)),
+        slide("D", "c", "d", (3.0, 0.0, 0.0), X),
+    ]
+    coupling = [{"name": "sum", "joints": list("ABCD"), "ratios": [0.3, 1.0, -0.7, 0.4]}]
+    scene = Scene(name="chain", gravity=(1, -9, 3), body=bodies, joint=joints, coupling=coupling)
+    motion = mbref.simulate(scene, times=[0.0, 0.3], rtol=1e-12)
+    exact = gauss(scene)
+    assert np.abs(stacked(scene, motion, 0) - exact).max() < 1e-10 * np.abs(exact).max()
+    assert motion.energy[1] == pytest.approx(motion.energy[0], abs=1e-9)
+    assert motion.violation.position.max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("name", "family", "options"),
+    [
+        ("simbody", "merson", {"accuracy": 1e-9}),
+        ("dart", "terms", {}),
+    ],
+)
+def test_engine_that_sums_coordinates_moves_a_differential_by_its_closed_form(name, family, options):
+    pytest.importorskip({"simbody": "opensim", "dart": "dartpy"}.get(name, name))
+    runner, scene = engine(name), differential()
+    *_, finest = (s for s in runner.settings(scene) if s.family == family)
+    motion = runner.run(scene, TIMES, Setting(family, {**finest.options, **options}))
+    q, _ = accelerations(INERTIAS, TORQUES, RATIOS)
+    found = mbref.Motion.of(scene, motion).joint("C").rate
+    assert found == pytest.approx(q[2] * TIMES, abs=1e-7)
+
+
+@pytest.mark.parametrize("name", ["mujoco", "exudyn", "pinocchio"])
+def test_engine_that_couples_pairs_refuses_a_sum_by_name(name):
+    refusal = engine(name).supports.missing(differential())
+    assert "coupling 'gears' sums 3 coordinates" in str(refusal)
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        ({"ratios": [1.0, 1.0]}, "ratios: must be 3, one for each joint, got 2"),
+        ({"ratios": None, "ratio": 1.0}, "ratio: relates two joints; 3 joints need ratios, one for each"),
+        ({"ratios": None}, "ratios: is required"),
+        ({"ratios": [1.0, 0.0, 1.0]}, "ratios: must not be 0, which would leave out its joint"),
+        ({"ratios": [1.0, 1.0, 1.0], "ratio": 2.0}, "ratios: or ratio, not both"),
+        ({"joints": ["A", "B", "A"]}, "joints: 'A' is revolute, which has no displacement to be coupled"),
+        ({"ratios": [1.0, "1 m/rad", 1.0]}, "ratios[1]: is in rad/rad, got '1 m/rad'"),
+        ({"coordinates": ["angle"]}, "coordinates: must be 3, one for each joint, got 1"),
+    ],
+)
+def test_fault_of_a_sum_is_named_by_its_field(change, fault):
+    entry = {"name": "gears", "joints": ["A", "B", "C"], "ratios": RATIOS.tolist(), **change}
+    with pytest.raises(SceneError) as found:
+        differential(coupling=[{k: v for k, v in entry.items() if v is not None}])
+    assert found.value.faults == [f"coupling[gears].{fault}"]
