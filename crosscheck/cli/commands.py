@@ -30,6 +30,7 @@ from crosscheck.study.grid import Record, key
 from crosscheck.study.progress import counted
 from crosscheck.study.provenance import made_by
 from mbref.command_line import status_of
+from mbref.files import write
 from mbref.motions.trajectory import Outcome
 
 
@@ -79,9 +80,15 @@ def _verify(arguments: argparse.Namespace) -> int:
     if arguments.mechanisms:
         return _verify_random(engine, arguments)
     chosen = request.find_specimens(arguments.scene, arguments.reference_time, engine)
+    limits = request.find_limits(arguments.limits, arguments.baseline, arguments.scene or ())
     with counted("verifying", len(chosen) + 1) as advance, standard_output_kept():
         runner = suite.runner(engine, arguments.time_limit, arguments.in_process)
-        found = suite.held_against(runner, chosen, advance, arguments.family)
+        how = arguments.family, limits.judged, arguments.budget
+        found = suite.held_against(runner, chosen, advance, *how)
+    if arguments.junit:
+        from crosscheck.conformance.junit import junit
+
+        write(arguments.junit, junit(found))
     if arguments.json:
         print(json.dumps({**found.to_record(), **made_by()}, allow_nan=False))
     else:

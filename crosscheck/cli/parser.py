@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from textwrap import fill
 
 from crosscheck.cli.commands_of_engines import (
@@ -35,7 +36,7 @@ from crosscheck.closed_loops.records import FILE
 from crosscheck.convergence.ladders import FILE as LADDERS
 from crosscheck.invariants.records import FILE as INVARIANTS
 from crosscheck.study.timings import REPEATS
-from mbref.command_line import Parser, add_output, commands, number, record_file, whole
+from mbref.command_line import MOST_DURATION, Parser, add_output, commands, number, record_file, whole
 
 FIRST = """\
 first steps:
@@ -158,6 +159,24 @@ def _add_verify(commands: Commands) -> None:
         action="store_true",
         help="run in this process: fast, but a crash ends all, and repeated runs share the process",
     )
+    parser.add_argument(
+        "--limits",
+        metavar="FILE",
+        help="own limits of checks and expected failures (.toml; docs/verify-your-engine.md)",
+    )
+    parser.add_argument(
+        "--baseline",
+        metavar="FILE",
+        help="what --json printed before: failures that are no worse do not count",
+    )
+    parser.add_argument(
+        "--budget",
+        type=number(MOST_DURATION, "s"),
+        default=math.inf,
+        metavar="T",
+        help="begin no scene after T seconds, and name the scenes that were left out",
+    )
+    add_output(parser, "--junit", metavar="FILE", help="also write a JUnit file of the checks that ran")
     drawn = parser.add_argument_group(
         "checks on random mechanisms instead of scenes; all runs are in this process"
     )

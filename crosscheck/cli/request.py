@@ -6,10 +6,12 @@ import dataclasses
 import math
 import traceback
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from crosscheck.cli.scene_request import Notice, RequestError
+from crosscheck.conformance.mechanisms.features import undetermined
 from crosscheck.conformance.mechanisms.planar import left_out, planar_specimens
 from crosscheck.conformance.mechanisms.specimens import Specimen, specimens
 from crosscheck.engine import ALL, BUILT_IN, all_engines, default_engines, engine
@@ -17,6 +19,9 @@ from crosscheck.judge.constraints import scene_length
 from mbref.command_line import MOST_DURATION
 from mbref.scene import Scene
 from mbref.scene.fields import meant
+
+if TYPE_CHECKING:
+    from crosscheck.conformance.own_limits import OwnLimits
 
 SAMPLES = 101
 MOST_STATES = 5_000_000  # states of a body that all runs of a command keep: they need about 1 kB each
@@ -64,6 +69,17 @@ def find_specimens(names: Sequence[str] | None, reference_time: float, name: str
     others = left_out(engine(name) if name else None)
     chosen = names or [scene for scene in known if scene not in others]
     return [{**known, **given}[scene] for scene in dict.fromkeys(chosen)]
+
+
+def find_limits(limits: str | None, baseline: str | None, files: Sequence[str]) -> OwnLimits:
+    """Return the limits of an engine's author in the named files; ``files`` are further scenes. Raises
+    SceneError for a faulty file."""
+    from crosscheck.conformance.own_limits import OwnLimits, read_baseline, read_limits
+
+    known = [undetermined().name, *(s.scene.name for s in (*specimens(), *planar_specimens()))]
+    known += [Scene.from_file(name).name for name in files if name.endswith(".toml")]
+    found = read_limits(limits, known) if limits else OwnLimits()
+    return dataclasses.replace(found, baseline=read_baseline(baseline)) if baseline else found
 
 
 def _unknown_engine(name: str) -> str | None:

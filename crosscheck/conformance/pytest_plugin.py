@@ -6,6 +6,7 @@ Every check on every scene is a pytest test. The modules of the suite are import
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
+    from crosscheck.conformance.own_limits import OwnLimits
     from crosscheck.conformance.suite import Verdict
     from crosscheck.conformance.trial import Bench
 
@@ -38,6 +40,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--in-process", action="store_true", help="run in this process: fast, but a crash ends all"
     )
     group.addoption("--time-limit", type=float, default=60.0, metavar="T", help="of a run, s (60)")
+    group.addoption("--limits", metavar="FILE", help="own limits and expected failures, as of verify")
+    group.addoption("--baseline", metavar="FILE", help="what verify --json printed: no worse does not fail")
     group.addoption(
         "--findings", metavar="DIR", help="folder in which failing scenes are stored, reduced to small ones"
     )
@@ -82,6 +86,7 @@ class Session:
         if not deep:  # replace references, which take 20 s each, by Gauss's principle
             known = [replace(specimen, reference_time=0.0) for specimen in known]
         self.specimens = {specimen.scene.name: specimen for specimen in known}
+        self.limits = _limits(config, self.specimens)
         self.benches: dict[str, Bench] = {}
         self.cache = config.cache if config.pluginmanager.hasplugin("cacheprovider") else None
         self.known = self.cache.get(KEPT, {}) if self.cache else {}
@@ -115,11 +120,24 @@ class Session:
         bench = self.bench(scene)
         if bench.cannot and check != REFUSAL:
             return Verdict(check, scene, CANNOT, reason=str(bench.cannot))
-        found = verdict_on(check, bench)
+        found = self.limits.judged(verdict_on(check, bench))
         self.known[key] = found.status
         if self.cache:
             self.cache.set(KEPT, self.known)
         return found
+
+
+def _limits(config: pytest.Config, scenes: Collection[str]) -> OwnLimits:
+    """Return the limits of the engine's author; raises pytest.UsageError for a faulty file."""
+    from crosscheck.conformance.own_limits import OwnLimits, read_baseline, read_limits
+    from mbref.scene import SceneError
+
+    limits, baseline = config.getoption("limits"), config.getoption("baseline")
+    try:
+        found = read_limits(limits, scenes) if limits else OwnLimits()
+        return replace(found, baseline=read_baseline(baseline)) if baseline else found
+    except SceneError as error:
+        raise pytest.UsageError(str(error)) from error
 
 
 def _check(name: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
@@ -25,7 +26,9 @@ from crosscheck.processes.interrupts import calls_ended
 from crosscheck.processes.pool import ChildFailed
 
 PASS, FAIL, CANNOT, OUTSIDE = "pass", "fail", "cannot", "outside"
+EXPECTED = "expected"  # a failure that the author of the engine expects
 REFUSAL, RUN = "refusal", "run"
+MARK_OF_EXPECTED = {EXPECTED: ("≈", "yellow")}
 MARKS = {PASS: ("✓", "green"), FAIL: ("✗", "bold red"), CANNOT: ("–", "yellow"), OUTSIDE: ("○", "dim")}
 FIRST = {
     REFUSAL: "cannot() refuses scenes that the engine cannot run, with a reason, and has settings for "
@@ -64,6 +67,7 @@ class Conformance:
     verdicts: Sequence[Verdict]
     family: str = ""  # family of settings; empty: the engine's best family
     hint: str = ""  # one sentence on the cause of failures
+    left_out: Sequence[str] = ()  # scenes that a time budget left out
 
     @property
     def conforms(self) -> bool:
@@ -75,7 +79,14 @@ class Conformance:
     def to_record(self) -> dict[str, Any]:
         """Return the record that ``verify --json`` prints; numbers that are not finite are null."""
         verdicts = [record_of(verdict) for verdict in self.verdicts]
-        return {**asdict(self), "conforms": self.conforms, "verdicts": verdicts}
+        lists = {"verdicts": verdicts, "left_out": list(self.left_out)}
+        return {**asdict(self), "conforms": self.conforms, **lists}
+
+    @property
+    def marks(self) -> dict[str, tuple[str, str]]:
+        """Marks and styles of the statuses that tables show."""
+        has_expected = any(verdict.status == EXPECTED for verdict in self.verdicts)
+        return {**MARKS, **(MARK_OF_EXPECTED if has_expected else {})}
 
 
 def record_of(verdict: Verdict) -> dict[str, Any]:
@@ -96,18 +107,27 @@ def held_against(
     specimens: Sequence[Specimen],
     progress: Callable[[str], None] | None = None,
     family: str = "",
+    judged_by: Callable[[Verdict], Verdict] | None = None,
+    budget: float = math.inf,
 ) -> Conformance:
     """Return the verdicts on a runner's engine in its best family of settings, or in the given family.
 
     Runs in this process take place one after another. ``progress`` receives each finished scene.
+    ``judged_by`` returns a verdict by limits of the engine's author. No scene begins after ``budget`` (s).
     """
     versions: set[str] = set()
+    end, left_out = time.monotonic() + budget, []
 
     def examined(specimen: Specimen) -> list[Verdict]:
+        if time.monotonic() > end:
+            left_out.append(specimen.scene.name)
+            return []
         bench = asked(runner, specimen, family)
         if isinstance(bench, Bench):
             versions.add(bench.version)
         verdicts = list(examine(bench)) if isinstance(bench, Bench) else [bench]
+        if judged_by:
+            verdicts = [judged_by(verdict) for verdict in verdicts]
         if progress:
             progress(specimen.scene.name)
         return verdicts
@@ -117,9 +137,8 @@ def held_against(
         with calls_ended(calls):
             verdicts = [verdict for call in calls for verdict in call.result()]
     failures = _failures(specimens, verdicts)
-    return Conformance(
-        runner.name, ", ".join(sorted(versions)), verdicts, family, hint(runner, failures, family)
-    )
+    found = hint(runner, failures, family)
+    return Conformance(runner.name, ", ".join(sorted(versions)), verdicts, family, found, left_out)
 
 
 def _failures(specimens: Sequence[Specimen], verdicts: Sequence[Verdict]) -> list[Failure]:
@@ -207,9 +226,10 @@ def judged(label: str, bench: Bench) -> Verdict:
 def tables(conformance: Conformance) -> Iterator[Table | Text]:
     """Return a table of scenes with the number of checks by status, then refusals, checks and failures."""
     properties = [n for n in (*FIRST, *PROPERTIES) if any(v.property == n for v in conformance.verdicts)]
+    marks = conformance.marks
     named = " ".join(filter(None, (conformance.engine, conformance.version, conformance.family)))
-    title = f"{named}: checks that {', '.join(f'{mark} {status}' for status, (mark, _) in MARKS.items())}"
-    counts = [Column(mark, justify="right") for mark, _ in MARKS.values()]
+    title = f"{named}: checks that {', '.join(f'{mark} {status}' for status, (mark, _) in marks.items())}"
+    counts = [Column(mark, justify="right") for mark, _ in marks.values()]
     table = Table(
         "scene",
         *counts,
@@ -219,12 +239,14 @@ def tables(conformance: Conformance) -> Iterator[Table | Text]:
     )
     for scene in dict.fromkeys(v.scene for v in conformance.verdicts):
         own = [v for v in conformance.verdicts if v.scene == scene]
-        table.add_row(scene, *(_count(own, status) for status in MARKS), _worst(own))
+        table.add_row(
+            scene, *(_count(own, status, style) for status, (_, style) in marks.items()), _worst(own)
+        )
     yield table
-    yield from (_sentence(verdict) for verdict in conformance.verdicts if verdict.status == CANNOT)
+    yield from (Text(sentence_of(v)) for v in conformance.verdicts if v.status in (CANNOT, EXPECTED))
     yield from _domains(conformance)
     yield from (Text(f"{_check(name)}: {abouts()[name]}", style="dim") for name in properties)
-    yield from (_sentence(verdict) for verdict in conformance.verdicts if verdict.status == FAIL)
+    yield from (Text(sentence_of(verdict)) for verdict in conformance.verdicts if verdict.status == FAIL)
     if conformance.hint:
         yield Text(conformance.hint)
     yield _summary(conformance)
@@ -249,10 +271,10 @@ def abouts() -> dict[str, str]:
     return {**FIRST, **{name: entry.about for name, entry in PROPERTIES.items()}}
 
 
-def _count(verdicts: Sequence[Verdict], status: str) -> Text:
+def _count(verdicts: Sequence[Verdict], status: str, style: str) -> Text:
     """Return the number of verdicts with a status in words; empty if no verdict has the status."""
     number = sum(verdict.status == status for verdict in verdicts)
-    return Text(str(number or ""), style=MARKS[status][1])
+    return Text(str(number or ""), style=style)
 
 
 def _worst(verdicts: Sequence[Verdict]) -> Text:
@@ -264,20 +286,25 @@ def _worst(verdicts: Sequence[Verdict]) -> Text:
     return Text("" if nearest is None else f"{nearest} at {100 * shares[nearest]:.2g} % of its limit")
 
 
-def _sentence(verdict: Verdict) -> Text:
+def sentence_of(verdict: Verdict) -> str:
+    """Return one sentence on a verdict: scene, check, measured value, limit, and reason."""
     measured = ""
     if verdict.measured is not None:
         measured = f" {verdict.measured:.3g}, allowed {verdict.allowed:.3g}"
     tail = f"({verdict.reason})" if measured and verdict.reason else verdict.reason
-    return Text(f"{verdict.status}: {verdict.scene}, {verdict.property}:{measured} {tail}".rstrip())
+    return f"{verdict.status}: {verdict.scene}, {verdict.property}:{measured} {tail}".rstrip()
 
 
 def _summary(conformance: Conformance) -> Text:
-    counts = [f"{sum(v.status == status for v in conformance.verdicts)} {status}" for status in MARKS]
+    counts = [
+        f"{sum(v.status == status for v in conformance.verdicts)} {status}" for status in conformance.marks
+    ]
     scenes = {v.scene for v in conformance.verdicts}
     run = {v.scene for v in conformance.verdicts if v.property == "run" and v.status in (PASS, FAIL)}
     nothing = "" if run else "; an engine that runs no scene is not shown to conform"
-    return Text(f"{conformance.engine}: {', '.join(counts)}; {len(run)} of {len(scenes)} scenes run{nothing}")
+    late = f"; left out by the time budget: {', '.join(conformance.left_out)}" if conformance.left_out else ""
+    ran = f"{len(run)} of {len(scenes)} scenes run"
+    return Text(f"{conformance.engine}: {', '.join(counts)}; {ran}{late}{nothing}")
 
 
 def _finite(value: Any) -> Any:

@@ -1,0 +1,43 @@
+"""Verdicts as a JUnit file for test servers: checks that ran alone, with numbers in the failing line."""
+
+from __future__ import annotations
+
+from collections import Counter
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+from crosscheck.conformance.suite import CANNOT, EXPECTED, FAIL, OUTSIDE, PASS, Conformance, sentence_of
+
+
+def junit(conformance: Conformance) -> str:
+    """Return the XML text of one test suite: a case for each check that ran, named scene and check.
+
+    Checks that the engine refuses, or that do not apply, are no cases; properties of the suite count them.
+    Expected failures are skipped cases with their reason. The hint is the output of the suite.
+    """
+    ran = [v for v in conformance.verdicts if v.status in (PASS, FAIL, EXPECTED)]
+    root = Element("testsuites")
+    suite = SubElement(
+        root,
+        "testsuite",
+        name=f"crosscheck.{conformance.engine}",
+        tests=str(len(ran)),
+        failures=str(sum(v.status == FAIL for v in ran)),
+        skipped=str(sum(v.status == EXPECTED for v in ran)),
+        errors="0",
+    )
+    properties = SubElement(suite, "properties")
+    counts = Counter(verdict.status for verdict in conformance.verdicts)
+    about = {"version": conformance.version, "left out": len(conformance.left_out)}
+    about |= {status: counts[status] for status in (CANNOT, OUTSIDE)}
+    for name, value in about.items():
+        SubElement(properties, "property", name=name, value=str(value))
+    for verdict in ran:
+        case = SubElement(suite, "testcase", classname=verdict.scene, name=verdict.property)
+        if verdict.status == FAIL:
+            SubElement(case, "failure", message=sentence_of(verdict)).text = conformance.hint
+        elif verdict.status == EXPECTED:
+            SubElement(case, "skipped", message=sentence_of(verdict))
+    if conformance.hint:
+        SubElement(suite, "system-out").text = conformance.hint
+    indent(root)
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + tostring(root, encoding="unicode") + "\n"

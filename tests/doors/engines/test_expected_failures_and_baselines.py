@@ -1,0 +1,135 @@
+"""Own limits, strict expected failures, baseline, time budget and JUnit files of the conformance suite."""
+
+import json
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import pytest
+
+from crosscheck.cli import main
+from crosscheck.conformance import suite
+from crosscheck.conformance.junit import junit
+from crosscheck.conformance.mechanisms.specimens import specimens
+from crosscheck.conformance.own_limits import OwnLimits, read_baseline, read_limits
+from crosscheck.conformance.runners import InProcess
+from mbref.scene import SceneError
+from tests.helpers.low_order_engines import low_order, midpoint
+
+[FALL] = [replace(each, related=False) for each in specimens() if each.scene.name == "free_fall"]
+SCENES = ("free_fall", "pendulum")
+HEAVY = "gravity acts twice"
+
+
+def verify(fault: str = "", limits: OwnLimits | None = None, budget: float = 60.0) -> suite.Conformance:
+    """Return the verdicts on an engine of order 2, perhaps with a fault, on a free fall."""
+    judged = (limits or OwnLimits()).judged
+    return suite.held_against(InProcess(low_order(midpoint, fault)), [FALL], None, "", judged, budget)
+
+
+@pytest.fixture(scope="module")
+def right() -> suite.Conformance:
+    return verify()
+
+
+@pytest.fixture(scope="module")
+def wrong() -> suite.Conformance:
+    return verify(HEAVY)
+
+
+def failed(found: suite.Conformance) -> list[suite.Verdict]:
+    return [verdict for verdict in found.verdicts if verdict.status == suite.FAIL]
+
+
+def written(tmp_path, text: str) -> OwnLimits:
+    (tmp_path / "limits.toml").write_text(text)
+    return read_limits(tmp_path / "limits.toml", SCENES)
+
+
+def expecting(checks, tmp_path) -> OwnLimits:
+    entries = (f'[[expected]]\ncheck = "{check}"\nreason = "heavy"\n' for check in checks)
+    return written(tmp_path, "".join(entries))
+
+
+def test_expected_failures_do_not_count_and_passes_of_them_fail(right, wrong, tmp_path):
+    """The planted fault's failures are expected; the engine without it then fails with the remedy."""
+    assert right.conforms and not wrong.conforms
+    limits = expecting({verdict.property for verdict in failed(wrong)}, tmp_path)
+    assert verify(HEAVY, limits).conforms
+    strict = [limits.judged(verdict) for verdict in right.verdicts]
+    assert {v.property for v in strict if v.status == suite.FAIL} == {v.property for v in failed(wrong)}
+    assert all("remove it from the file" in v.reason for v in strict if v.status == suite.FAIL)
+
+
+def test_own_limit_replaces_the_limit_of_a_check_on_its_scenes(right, wrong, tmp_path):
+    """Twice the measured value passes, half of it fails; another scene's limit changes nothing."""
+    verdict = next(v for v in failed(wrong) if v.measured)
+    cases = ("free_fall", 2, "pass"), ("free_fall", 0.5, "fail"), ("pendulum", 2, "fail")
+    for scene, factor, status in cases:
+        entry = f'[[limit]]\ncheck = "{verdict.property}"\nscenes = ["{scene}"]\n'
+        limits = written(tmp_path, f"{entry}allowed = {factor * verdict.measured!r}")
+        assert limits.judged(verdict).status == status
+    limits = written(tmp_path, f"[limits]\n{verdict.property} = {2 * verdict.measured!r}")
+    assert limits.judged(verdict).allowed == 2 * verdict.measured
+
+
+def test_failure_no_worse_than_in_the_baseline_does_not_count(right, wrong, tmp_path):
+    """The record of the faulty engine excuses it; a value of three times as much, and the record of the right
+    engine do not."""
+    for name, found in (("wrong", wrong), ("right", right)):
+        (tmp_path / f"{name}.json").write_text(json.dumps(found.to_record()))
+    before = OwnLimits(baseline=read_baseline(tmp_path / "wrong.json"))
+    assert {before.judged(v).status for v in failed(wrong)} == {suite.EXPECTED}
+    worse = [replace(v, measured=3 * v.measured) for v in failed(wrong) if v.measured]
+    assert worse and all("the baseline has" in before.judged(v).reason for v in worse)
+    passed = OwnLimits(baseline=read_baseline(tmp_path / "right.json"))
+    known = [v for v in failed(wrong) if v.property != "run"]
+    assert known and all("passes in the baseline" in passed.judged(v).reason for v in known)
+    with pytest.raises(SceneError, match="is not a file that crosscheck verify --json printed"):
+        (tmp_path / "wrong.json").write_text("{}")
+        read_baseline(tmp_path / "wrong.json")
+
+
+def test_scenes_after_the_time_budget_are_named_and_conform_to_nothing():
+    found = verify(budget=0.0)
+    assert "free_fall" in found.left_out and not found.verdicts and not found.conforms
+    assert "left out by the time budget" in str([*suite.tables(found)][-1])
+
+
+def test_junit_file_has_the_checks_that_ran_with_numbers_and_no_other_case(wrong, tmp_path):
+    """Failures, expected failures and passes; counts of checks that do not apply are properties."""
+    some = failed(wrong)[0].property
+    limits = expecting([some], tmp_path)
+    found = replace(wrong, verdicts=[limits.judged(v) for v in wrong.verdicts])
+    suite_ = ElementTree.fromstring(junit(found).partition("\n")[2]).find("testsuite")
+    ran = [v for v in found.verdicts if v.status in ("pass", "fail", "expected")]
+    cases = suite_.findall("testcase")
+    assert [(c.get("classname"), c.get("name")) for c in cases] == [(v.scene, v.property) for v in ran]
+    assert suite_.get("failures") == str(len(failed(found))) and suite_.get("skipped") == "1"
+    failure = suite_.find("testcase/failure")
+    assert "allowed" in failure.get("message") and failure.text == found.hint != ""
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[limits]\nclosur = 1.0", "unknown check 'closur'; .* mean 'closure'"),
+        ("[limits]\nclosure = -1.0", "allowed of check 'closure' must be a positive number"),
+        ('[[limit]]\ncheck = "closure"\nscenes = ["fre_fall"]\nallowed = 1', "mean 'free_fall'"),
+        ('[[expected]]\ncheck = "closure"', "reason of check 'closure' is required"),
+        ('[[expect]]\ncheck = "closure"', "expect: is not a known table; did you mean 'expected'"),
+        ('[[limit]]\ncheck = "closure"\nalowed = 1', "alowed is not a known field; did you mean 'allowed'"),
+    ],
+)
+def test_faulty_file_of_limits_is_refused_with_the_entry(text, says, tmp_path):
+    with pytest.raises(SceneError, match=says):
+        written(tmp_path, text)
+
+
+def test_command_verify_reads_limits_and_writes_junit(tmp_path, capsys):
+    """A check that passes although it is expected to fail ends the command with status 1."""
+    entry = '[[expected]]\ncheck = "run"\nscenes = ["free_fall"]\nreason = "slow"'
+    (tmp_path / "limits.toml").write_text(entry)
+    files = ["--limits", str(tmp_path / "limits.toml"), "--junit", str(tmp_path / "verify.xml")]
+    assert main(["verify", "mujoco", "--scene", "free_fall", "--in-process", *files]) == 1
+    assert "remove it from the file of limits" in " ".join(capsys.readouterr().out.split())
+    assert "expected to fail (slow)" in (tmp_path / "verify.xml").read_text()
