@@ -63,17 +63,6 @@ def test_load_that_begins_to_act_moves_a_body_from_rest():
         assert moved == pytest.approx((2.0 - start) ** 2 / 2, rel=1e-9)  # rtol
 
 
-def test_table_is_a_twice_differentiable_spline_through_its_rows():
-    """Cubics through four values on either side of an inner row have one second derivative at the row."""
-    factor = Factor(table=WAVY)
-    times, values = np.array(WAVY).T
-    assert np.allclose(factor.values(times), values, atol=1e-14)
-    for t in times[1:-1]:
-        beside = [side * 0.05 * np.arange(4) for side in (1.0, -1.0)]  # s, within the pieces
-        second = [2 * np.polyfit(x, factor.values(t + x), 3)[1] for x in beside]
-        assert second[0] == pytest.approx(second[1], abs=1e-9)  # 1/s²; rounding 1e-16 over (0.05 s)² is 4e-14
-
-
 def test_equilibrium_of_a_load_over_time_is_refused():
     with pytest.raises(SceneError, match=r"load\[0\].factor: varies"):
         mbref.equilibria(scenes.wheel())
@@ -115,11 +104,6 @@ def test_faulty_function_of_time_is_refused_by_path_and_line(message, tmp_path):
     (fault,) = error.value.faults
     line = next(n for n, row in enumerate(path.read_text().splitlines(), 1) if row.startswith("factor"))
     assert fault.startswith("load[0].factor") and message in fault and fault.endswith(f"(line {line})")
-
-
-def test_table_of_a_driver_must_begin_at_zero():
-    with pytest.raises(SceneError, match="value at t = 0 must be 0"):
-        scenes.wheel().with_(driver=[{"joint": "J", "table": scenes.TABLE}])
 
 
 def test_force_along_a_joint_that_does_not_slide_is_refused():
