@@ -43,6 +43,12 @@ def _groups(folder: Path) -> list[SceneRuns]:
     times = read(folder / "timings.jsonl", Timing)
     stored = [_of_known_scenes(folder / f"{name}.jsonl", shape, named) for name, shape in SHAPES.items()]
     records, *more = (of_scenes(list(found.values()), scenes) for found in stored)
+    lost = {r["scene"] for r in stored[0].values()} - {r["scene"] for r in records}
+    if lost:
+        raise RecordsError(
+            f"{folder}/records.jsonl: records of {', '.join(sorted(lost))} are of another mechanism than the "
+            "file in scenes/; make the report again"
+        )
     gates = [r for r in records if _is_gate(named[r["scene"]], r)]
     runs = [with_time(r, times) for r in records if not any(r is gate for gate in gates)]
     return by_scene(_ordered(runs), named, gates, *more)

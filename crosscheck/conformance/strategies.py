@@ -166,7 +166,8 @@ def _two_hinges(draw: st.DrawFn, bodies: Sequence[Body], joints: Sequence[Joint]
         return [joints[-1].model_copy(update={"name": "R"})]  # a duplicate joint is redundant
     hinge = draw(st.sampled_from(hinges))
     axis = rotations.unit(hinge.axis)
-    kind = draw(st.sampled_from((Revolute, Cylindrical)))
+    kinds: list[type[Revolute | Cylindrical]] = [Revolute, Cylindrical]
+    kind = draw(st.sampled_from(kinds))
     return [kind(name="R", bodies=hinge.bodies, anchor=np.array(hinge.anchor) + 0.4 * axis, axis=axis)]
 
 

@@ -114,8 +114,6 @@ def split(scene: Scene) -> Scene | Outside:
         return _in_halves(scene, body)
     except SceneError as error:
         return Outside(f"the halves are not valid bodies: {error.faults[0]}")
-    except ValueError:
-        return Outside("the body is too thin to be split into two halves")
 
 
 def _is_corrected(scene: Scene) -> bool:

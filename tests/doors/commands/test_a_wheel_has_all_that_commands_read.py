@@ -46,6 +46,7 @@ COMMANDS = {
         ("tune", "--help"),
         ("verify", "--help"),
         ("findings",),
+        ("files", "model.xml", "--engine", "mbref"),
         ("closed-loops",),
         ("convergence",),
         ("invariants",),

@@ -83,11 +83,11 @@ def output(python: Path, tmp_path: Path, *words: str | Path) -> str:
     return run.stdout
 
 
-def test_packages_of_readmes_first_command_have_engines_and_matplotlib_and_no_pandas(python, tmp_path):
+def test_packages_of_readmes_first_command_have_engines_matplotlib_and_pandas_alone(python, tmp_path):
     """The requirements in pyproject.toml are resolved as pip does; other tests of this file need it."""
     found = "from importlib.util import find_spec as f; print(*(f(n) is not None for n in {}))"
     code = found.format(("mujoco", "pinocchio", "exudyn", "matplotlib", "pandas", "pytest", "pip"))
-    assert output(python, tmp_path, "-c", code).split() == ["True"] * 4 + ["False"] * 3
+    assert output(python, tmp_path, "-c", code).split() == ["True"] * 5 + ["False"] * 2
 
 
 def test_every_engine_of_the_first_example_completes_near_the_exact_motion(python, tmp_path):

@@ -113,3 +113,10 @@ def test_closed_loops_and_convergence_name_the_missing_field_of_a_record(tmp_pat
     for command in ("closed-loops", "convergence"):
         assert crosscheck([command, "--records", str(faulty)]) == 2
         assert "record 'k1': cost: field required" in capsys.readouterr().err
+
+
+def test_records_of_another_mechanism_than_the_scene_file_are_named_and_not_left_out(tmp_path, capsys):
+    """A record names its mechanism by a digest, here another one than that of the only scene."""
+    place = folder(tmp_path / "report", record_with("mechanism", "0123456789abcdef"))
+    assert report(["--render", str(place)]) == 2
+    assert "records of four_bar are of another mechanism" in capsys.readouterr().err
