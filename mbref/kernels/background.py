@@ -29,10 +29,10 @@ def compiled_in_background(kernels: Sequence[Exchangeable], module: str, functio
     """Compile the kernels by ``module.function()`` in a second process while the ``with`` block runs, then
     wait for the process.
 
-    No process is started if the cache has all kernels, or with one core. If the second process fails, the
-    kernels are compiled at their first call.
+    No process is started if the cache has all kernels, or with one core for this process. If the second
+    process fails, the kernels are compiled at their first call.
     """
-    if (os.cpu_count() or 1) < 2 or all(kernel.is_kept for kernel in kernels):
+    if _cores() < 2 or all(kernel.is_kept for kernel in kernels):
         yield
         return
     program = PROGRAM.format(module=module, function=function)
@@ -43,6 +43,11 @@ def compiled_in_background(kernels: Sequence[Exchangeable], module: str, functio
             process.wait()
         finally:
             process.kill()
+
+
+def _cores() -> int:
+    """Return the number of cores on which this process may run."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def end_with_parent() -> None:

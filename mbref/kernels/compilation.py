@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import gc
 import hashlib
 import os
 import sys
@@ -38,6 +37,7 @@ from mbref.kernels.disk_cache import (
 from mbref.kernels.file_lock import held, is_held
 from mbref.kernels.helper_code import HelperCompiler
 from mbref.kernels.interrupts import interrupts_kept
+from mbref.kernels.less_overhead import compare_options_as_dictionaries, garbage_kept
 
 # No fastmath: the same bits with and without the JIT.  Without numba's runtime (``_nrt``, undocumented there)
 # no kernel can allocate, and none counts references to its arrays, which takes time.
@@ -210,7 +210,8 @@ class Entry(Exchangeable):
         return self.pointer(*arguments)
 
     def _decorator(self, **options: Any) -> Function:
-        return njit(self.signature, **options)
+        wrapped: dict[str, Any] = {**options, "no_cfunc_wrapper": True}  # Python calls no C function
+        return njit(self.signature, **wrapped)
 
     def _is_loaded(self, compiled: Any) -> bool:
         return bool(compiled.stats.cache_hits)
@@ -232,13 +233,14 @@ def prepare_all(kernels: Sequence[Exchangeable]) -> None:
     Kernels that another process compiles come last, so that processes with different orders share the work.
     """
     elsewhere = []
-    for each in kernels:
-        if each.is_compiled_elsewhere:
-            elsewhere.append(each)
-        else:
+    with garbage_kept():
+        for each in kernels:
+            if each.is_compiled_elsewhere:
+                elsewhere.append(each)
+            else:
+                each.prepare()
+        for each in elsewhere:
             each.prepare()
-    for each in elsewhere:
-        each.prepare()
 
 
 def pair_of(first: types.Type, second: types.Type) -> types.Type:
@@ -255,8 +257,7 @@ def pointer_to(signature: Signature) -> types.Type:
 
 @functools.cache
 def _begin_compiling() -> None:
-    """Report on stderr why the first run takes long; standard output belongs to results. Modules are not
-    searched for garbage from now on, which takes 4 % of a compilation."""
-    gc.freeze()
+    """Report on stderr why the first run takes long; standard output belongs to results."""
+    compare_options_as_dictionaries()
     message = "mbref: compiling kernels for this machine, once for each method; up to a minute"
     print(message, file=sys.stderr, flush=True)
