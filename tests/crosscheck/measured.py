@@ -1,6 +1,7 @@
 """How far engines may be off in a test: MARGIN times the largest error that was measured where it runs. A
 test states the measured errors; whoever makes them smaller writes the new ones down."""
 
+from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory
@@ -14,6 +15,12 @@ def completed_error(run: Trajectory, scene: Scene) -> float:
     """Return `error_of_samples` of a run that must have completed."""
     assert run.outcome is Outcome.COMPLETED, f"{run.outcome.label} at {run.t_end} s: {run.message}"
     return error_of_samples(run, scene)
+
+
+def relative_error(run: Trajectory, scene: Scene) -> float:
+    """Return the judge's metric `error` (of the length, or rad) of a run that must have completed."""
+    assert run.outcome is Outcome.COMPLETED, f"{run.outcome.label} at {run.t_end} s: {run.message}"
+    return float(measure(scene, run, truth_for(scene))["error"])
 
 
 def error_of_samples(run: Trajectory, scene: Scene) -> float:

@@ -12,7 +12,7 @@ from crosscheck.judge.constraints import initial_twists
 from mbref import rotations
 from mbref.scene import JOINT_TYPES, Body, Coupling, Distance, Driver, Scene, Sine
 from mbref.scenes import SCENES
-from tests.crosscheck.tree_scenes import INERTIA, driven, every_joint, ring
+from tests.crosscheck.tree_scenes import INERTIA, body, driven, every_joint, ring
 from tests.helpers.parts import X, block, hinge, joint
 
 KINDS = tuple(JOINT_TYPES.values())
@@ -25,16 +25,9 @@ def graphs(draw: st.DrawFn) -> Scene:
     """Draw scenes of 1 to 6 bodies and up to 9 joints of any kind, between any two of them or the ground."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1), label="seed"))
     n = draw(st.integers(1, 6), label="bodies")
-    bodies = tuple(
-        Body(
-            name=f"b{i}",
-            mass=float(rng.uniform(0.5, 2)),
-            inertia=INERTIA,
-            position=rng.normal(size=3),
-            orientation=rotations.from_vector(rng.normal(size=3)),
-        )
-        for i in range(n)
-    )
+    bodies = [
+        body(f"b{i}", rng.normal(size=3), rng.normal(size=3), float(rng.uniform(0.5, 2))) for i in range(n)
+    ]
     names = ["ground", *(b.name for b in bodies)]
     joints = []
     for k, kind in enumerate(draw(st.lists(st.sampled_from(KINDS), max_size=9), label="joints")):

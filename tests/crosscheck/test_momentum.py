@@ -11,7 +11,8 @@ from crosscheck.conformance.suite import FAIL, Verdict
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.momentum import momentum_series
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import Body, Distance, Force, Moment, Revolute, Scene, Spherical, Spring
+from mbref.scene import Body, Distance, Force, Moment, Revolute, Scene, Spherical
+from tests.helpers.parts import spring
 
 FIRST = Body(name="a", mass=2.0, inertia=(1.0, 1.0, 2.0), position=(0.0, 0.0, 0.0), velocity=(3.0, 0.0, 0.0))
 SECOND = Body(
@@ -74,16 +75,7 @@ def test_impulses_of_gravity_forces_and_moments_are_no_drift():
     "change",
     [
         {"joint": (Spherical(name="S", bodies=("ground", "a"), anchor=(0.0, 0.0, 0.0)),)},
-        {
-            "load": (
-                Spring(
-                    bodies=("ground", "a"),
-                    points=((1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
-                    stiffness=1.0,
-                    natural_length=1.0,
-                ),
-            )
-        },
+        {"load": (spring("ground", (1.0, 0.0, 0.0), "a", (0.0, 0.0, 0.0), 1.0, 1.0),)},
         {"load": (Moment(body="b", moment=(0.0, 0.0, 1.0), factor={"polynomial": [0.0, 1.0]}),)},
         {"body": tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in (FIRST, SECOND))},
     ],

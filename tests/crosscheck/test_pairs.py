@@ -2,6 +2,7 @@
 
 import sys
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -21,10 +22,10 @@ from mbref.scene import (
     Moment,
     Revolute,
     Scene,
-    Spring,
     TorsionSpring,
 )
 from tests.crosscheck.side_by_side import side_by_side
+from tests.helpers.parts import spring
 
 GRAVITY = (0.0, -9.81, 0.0)  # m/s²
 TIMES = (0.0, 0.05, 0.1)
@@ -39,34 +40,22 @@ def twist(joint: str, stiffness: float, damping: float, natural_angle: float) ->
     return TorsionSpring(joint=joint, stiffness=stiffness, damping=damping, natural_angle=natural_angle)
 
 
-def spring(first: tuple, second: tuple, stiffness: float, natural_length: float) -> Spring:
-    return Spring(
-        bodies=("ground", "bob"),
-        points=(first, second),
-        stiffness=stiffness,
-        damping=0.3,
-        natural_length=natural_length,
-    )
-
-
 def pull(point: tuple, force: tuple) -> Force:
     return Force(body="bob", point=point, force=force)
 
 
-ENDS = (0.0, 1.0, 0.0), (1.0, -0.4, 0.0)
+TOP, TIP = (0.0, 1.0, 0.0), (1.0, -0.4, 0.0)
+tie = partial(spring, "ground", TOP, "bob", damping=0.3)
 PAIRS = {
     "two torsion springs": (twist("A", 13.0, 0.1, 1.4), twist("A", 22.0, 0.2, 0.7)),
     "torsion springs of two joints": (twist("A", 13.0, 0.1, 1.4), twist("B", 5.0, 0.2, -0.7)),
     "a torsion spring and a torsion damper": (twist("B", 13.0, 0.0, 1.4), twist("B", 0.0, 0.7, 0.3)),
     "a torsion damper and a torsion spring": (twist("B", 0.0, 0.7, 0.3), twist("B", 13.0, 0.0, 1.4)),
-    "two springs between the same points": (spring(*ENDS, 30.0, 1.0), spring(*ENDS, 50.0, 2.5)),
-    "two springs between the same bodies": (
-        spring(*ENDS, 30.0, 1.0),
-        spring(ENDS[0], (1.0, 0.0, 0.4), 9.0, 0.0),
-    ),
+    "two springs between the same points": (tie(TIP, 30.0, 1.0), tie(TIP, 50.0, 2.5)),
+    "two springs between the same bodies": (tie(TIP, 30.0, 1.0), tie((1.0, 0.0, 0.4), 9.0, 0.0)),
     "two moments": (Moment(body="bob", moment=(1.0, 0.0, 2.0)), Moment(body="bob", moment=(0.5, -1.0, 0.0))),
-    "two forces at one point": (pull(ENDS[1], (1.0, 2.0, 0.0)), pull(ENDS[1], (0.0, -5.0, 3.0))),
-    "two forces at two points": (pull(ENDS[1], (1.0, 2.0, 0.0)), pull((1.0, 0.0, 0.5), (0.0, -5.0, 3.0))),
+    "two forces at one point": (pull(TIP, (1.0, 2.0, 0.0)), pull(TIP, (0.0, -5.0, 3.0))),
+    "two forces at two points": (pull(TIP, (1.0, 2.0, 0.0)), pull((1.0, 0.0, 0.5), (0.0, -5.0, 3.0))),
 }
 ROBUST = ("alpha",)  # where Exudyn's best family stops at redundant rows
 ACCURATE = ("dart", "drake")  # large engines whose accelerations are integrated to small tolerances
@@ -153,12 +142,8 @@ STEPPERS = {
     "newton": Setting("padmm, moreau", {"step": 5e-4, "alpha": 0.1}),
 }
 DRIVEN = {"a driver and a torsion spring", "two drivers"}
-REFUSED = {
-    "bullet": set(),
-    "mjx": DRIVEN,
-    "warp": DRIVEN,
-    "newton": DRIVEN | {pair for pair in PAIRS if "torsion" in pair},
-}
+OF_TORSION = {pair for pair in PAIRS if "torsion" in pair}
+REFUSED = {"bullet": set(), "mjx": DRIVEN, "warp": DRIVEN, "newton": DRIVEN | OF_TORSION}
 SHARE = 0.1  # largest error / effect of the part of a pair with the least effect
 
 

@@ -24,13 +24,13 @@ from mbref.scene import (
     Scene,
     Sine,
     Spherical,
-    Spring,
     TorsionSpring,
     Translational,
     Universal,
 )
 from tests.crosscheck.measured import MARGIN
 from tests.crosscheck.tree_scenes import BODIES, INERTIA, JOINTS, driven, every_joint, ring
+from tests.helpers.parts import X, Y, Z, spring
 
 # worst differences measured, parts of the largest value; Gauss's principle is integrated to 1.8e-9
 MEASURED = {"pinocchio": 1.8e-9, "mujoco": 1.2e-7, "forward": 1.2e-8, "simbody": 1.3e-10, "sundials": 7.1e-6}
@@ -41,7 +41,7 @@ FINE = {
     "simbody": Setting("merson", {"accuracy": 1e-10}),
     "sundials": Setting("ggl", {"rtol": 1e-7}),
 }
-X, Y, Z, O = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+O = (0.0, 0.0, 0.0)
 
 
 def solo(name: str, **parts) -> Scene:
@@ -61,23 +61,15 @@ def pendulums() -> dict[str, Scene]:
     down, spin = (0.5, -9.81, 2.0), {"angular_velocity": (3.0, -2.0, 5.0)}
     sine = Sine(amplitude=0.4, frequency=8.0)
     pull = Force(body="bob", point=(0.5, 0.2, 0.1), force=(2.0, 3.0, -1.0))
-    tie = Spring(
-        bodies=("bob", "ground"),
-        points=((0.4, 0.1, 0.1), (0.0, 0.8, 0.0)),
-        stiffness=60.0,
-        damping=0.8,
-        natural_length=0.3,
-    )
+    tie = spring("bob", (0.4, 0.1, 0.1), "ground", (0.0, 0.8, 0.0), 60.0, 0.3, damping=0.8)
+    tether = Distance(name="J", bodies=("bob", "ground"), anchors=((0.3, 0.0, 0.2), (0.0, 0.5, 0.0)))
+    waves = (Driver(joint="J", polynomial=(0.0, 2.0, 1.0), sine=sine),), (Driver(joint="J", sine=sine),)
     twist = TorsionSpring(joint="J", stiffness=5.0, damping=0.05, natural_angle=0.7)
     return {
         "universal under gravity": solo("u", gravity=down, joint=on_ground(Universal, axes=(X, Y))),
         "universal to the ground": solo("v", gravity=down, joint=on_ground(Universal, True, axes=(X, Y))),
         "spherical": solo("s", gravity=down, joint=on_ground(Spherical), start=spin),
-        "distance": solo(
-            "d",
-            gravity=down,
-            joint=(Distance(name="J", bodies=("bob", "ground"), anchors=((0.3, 0.0, 0.2), (0.0, 0.5, 0.0))),),
-        ),
+        "distance": solo("d", gravity=down, joint=(tether,)),
         "free and spinning": solo("f", gravity=down, start=spin | {"velocity": (1.0, 2.0, 3.0)}),
         "fixed": solo("x", gravity=down, joint=on_ground(Fixed)),
         "spring": solo("k", load=(tie,), joint=on_ground(Revolute, axis=Z)),
@@ -87,15 +79,10 @@ def pendulums() -> dict[str, Scene]:
         "force at a point": solo("p", load=(pull,), joint=on_ground(Spherical)),
         "moment on a free body": solo("m", load=(Moment(body="bob", moment=(0.2, -0.1, 0.3)),)),
         "sine on a cylindrical": solo(
-            "c",
-            gravity=(0.0, 0.0, -9.81),
-            joint=on_ground(Cylindrical, axis=Z),
-            driver=(Driver(joint="J", polynomial=(0.0, 2.0, 1.0), sine=sine),),
+            "c", gravity=(0.0, 0.0, -9.81), joint=on_ground(Cylindrical, axis=Z), driver=waves[0]
         ),
         "sine on a translational": solo(
-            "a",
-            joint=on_ground(Translational, True, axis=(1.0, 2.0, 0.0)),
-            driver=(Driver(joint="J", sine=sine),),
+            "a", joint=on_ground(Translational, True, axis=(1.0, 2.0, 0.0)), driver=waves[1]
         ),
     }
 

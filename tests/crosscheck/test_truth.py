@@ -14,9 +14,10 @@ from crosscheck.judge.loads import world_inertia
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import NoSolution, truth_for
 from mbref import rotations
-from mbref.scene import Body, Driver, Revolute, Scene, Spring, TorsionSpring
+from mbref.scene import Body, Driver, Revolute, Scene, TorsionSpring
 from mbref.scenes import SCENES
-from tests.crosscheck.truth_scenes import ALL, Z, block, free, pendulum
+from tests.crosscheck.truth_scenes import ALL, block, free, pendulum
+from tests.helpers.parts import Z, hinge, spring
 
 ROUNDED = 1e-14  # m or rad: some roundings of numbers up to 1
 
@@ -158,14 +159,8 @@ def test_torsion_pendulum_is_the_damped_oscillator(sign):
 def test_block_on_a_damped_spring_is_the_damped_oscillator():
     """A block of 2 kg on a slope (sine 0.8), pulled by a spring along it: 50 N/m, 4 N s/m, 1 m stretched; it
     rests at (50 · 1 - 2 g · 0.8) / 50 m and swings with δ = 1/s, ω = √(25 - 1) rad/s."""
-    spring = Spring(
-        bodies=("block", "ground"),
-        points=((1.0, 2.0, 3.0), (7.0, 10.0, 3.0)),
-        stiffness=50.0,
-        damping=4.0,
-        natural_length=9.0,
-    )
-    scene = block(gravity=(0.0, -9.81, 0.0), load=(spring,))
+    pull = spring("block", (1.0, 2.0, 3.0), "ground", (7.0, 10.0, 3.0), 50.0, 9.0, damping=4.0)
+    scene = block(gravity=(0.0, -9.81, 0.0), load=(pull,))
     t = np.linspace(0, 1, 30)
     rest = (50.0 * (10.0 - 9.0) - 2.0 * 9.81 * 0.8) / 50.0
     w = math.sqrt(50.0 / 2.0 - 1.0)
@@ -178,19 +173,11 @@ def test_truth_ends_where_a_spring_has_no_length():
     """A bar turned by half a turn brings a spring to length zero, where its force jumps. At the time that the
     error states the angle is π, to 1e-6 rad, and the energy that of the start: spring and spin of 0.0533 kg
     m² about the pivot."""
-    bar = Body(
-        name="bar",
-        mass=1.0,
-        inertia=(0.001, 0.0133, 0.0133),
-        position=(0.2, 0, 0),
-        velocity=(0.0, 1.0, 0.0),
-        angular_velocity=(0.0, 0.0, 5.0),
-    )
-    spring = Spring(
-        bodies=("ground", "bar"), points=((-0.4, 0, 0), (0.4, 0, 0)), stiffness=20.0, natural_length=0.3
-    )
-    pin = Revolute(name="A", bodies=("ground", "bar"), anchor=(0, 0, 0), axis=(0, 0, 1))
-    truth = truth_for(Scene(name="bar", duration=2.0, body=(bar,), joint=(pin,), load=(spring,)))
+    twist = {"velocity": (0.0, 1.0, 0.0), "angular_velocity": (0.0, 0.0, 5.0)}
+    bar = Body(name="bar", mass=1.0, inertia=(0.001, 0.0133, 0.0133), position=(0.2, 0, 0), **twist)
+    pull = spring("ground", (-0.4, 0, 0), "bar", (0.4, 0, 0), 20.0, 0.3)
+    pin = hinge("A", "ground", "bar", (0.0, 0.0, 0.0))
+    truth = truth_for(Scene(name="bar", duration=2.0, body=(bar,), joint=(pin,), load=(pull,)))
     with pytest.raises(NoSolution) as caught:
         truth.poses(np.linspace(0, 2, 21))
     until = caught.value.until
@@ -221,11 +208,7 @@ def test_free_body_falls_and_keeps_energy_and_angular_momentum():
     scene = free(gravity=(0.0, 0.0, -9.81), duration=5.0)
     t = np.linspace(0, 5.0, 40)
     motion = truth_for(scene).poses(t)
-    fall = (
-        np.array([1.0, 0, 0])
-        + t[:, None] * np.array([0, 2.0, 1.0])
-        + t[:, None] ** 2 / 2 * np.array([0, 0, -9.81])
-    )
+    fall = np.array([1.0, 0, 0]) + np.outer(t, [0, 2.0, 1.0]) + np.outer(t**2 / 2, [0, 0, -9.81])
     assert np.abs(motion.position[:, 0] - fall).max() < 10 * ROUNDED
     inertia = world_inertia(scene, rotations.to_matrix(motion.orientation))[:, 0]
     momentum = np.einsum("kij,kj->ki", inertia, motion.angular_velocity[:, 0])

@@ -10,7 +10,8 @@ from mbref import rotations
 from mbref.scene import Body, Driver, Revolute, Scene, Spherical, Translational, Universal
 from mbref.scenes import SCENES
 from mbref.scenes.planar_slider_crank import planar_slider_crank, slider_crank
-from tests.crosscheck.truth_scenes import ALL, CLOSED, Z, free, pendulum
+from tests.crosscheck.truth_scenes import ALL, CLOSED, free, pendulum
+from tests.helpers.parts import Z
 
 ROUNDED = 1e-13  # m or rad; roundings of 1, and their growth along the motion
 FAMILY = {name: name for name in ("planar_slider_crank", "spatial_slider_crank")} | {

@@ -10,17 +10,16 @@ from mbref.scene import (
     Fixed,
     Force,
     Joint,
-    Load,
     Moment,
     Revolute,
     Scene,
     Sine,
     Spherical,
-    Spring,
     TorsionSpring,
     Translational,
     Universal,
 )
+from tests.helpers.parts import Z, hinge, spring
 
 INERTIA = ((0.02, 0.002, -0.001), (0.002, 0.03, 0.003), (-0.001, 0.003, 0.025))
 
@@ -44,31 +43,16 @@ JOINTS: tuple[Joint, ...] = (
     Revolute(name="rev", bodies=("ground", "root"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 2.0)),
     Spherical(name="sph", bodies=("hand", "arm"), anchor=(0.35, 0.7, 0.2)),
     Distance(name="dist", bodies=("hand", "piston"), anchors=((0.3, 1.0, 0.2), (-0.4, 0.8, 0.5))),
-    Universal(
-        name="uni", bodies=("arm", "root"), anchor=(0.3, 0.3, 0.1), axes=((1.0, 0.0, 1.0), (1.0, 1.0, -1.0))
-    ),
+    Universal(name="uni", bodies=("arm", "root"), anchor=(0.3, 0.3, 0.1), axes=((1, 0, 1), (1, 1, -1))),
     Cylindrical(name="cyl", bodies=("piston", "ground"), anchor=(-0.5, 0.5, 0.4), axis=(0.0, 1.0, 0.2)),
     Translational(name="tra", bodies=("sled", "ground"), anchor=(1.0, 0.5, 0.2), axis=(0.3, 1.0, 0.0)),
     Fixed(name="fix", bodies=("lump", "root"), anchor=(0.1, 0.0, 0.1)),
-    Universal(
-        name="uni7", bodies=("arm7", "root"), anchor=(0.4, 0.2, 0.1), axes=((0.0, 0.0, 1.0), (1.0, -1.0, 0.0))
-    ),
+    Universal(name="uni7", bodies=("arm7", "root"), anchor=(0.4, 0.2, 0.1), axes=(Z, (1, -1, 0))),
     Spherical(name="sph7", bodies=("sled", "arm7"), anchor=(0.8, 0.7, 0.2)),
 )
-LOADS: tuple[Load, ...] = (
-    Spring(
-        bodies=("sled", "hand"),
-        points=((1.0, 0.9, 0.2), (0.4, 1.0, 0.1)),
-        stiffness=40.0,
-        damping=0.5,
-        natural_length=0.4,
-    ),
-    Spring(
-        bodies=("ground", "arm"),
-        points=((0.0, 1.5, 0.0), (0.3, 0.6, 0.3)),
-        stiffness=20.0,
-        natural_length=0.3,
-    ),
+LOADS = (
+    spring("sled", (1.0, 0.9, 0.2), "hand", (0.4, 1.0, 0.1), 40.0, 0.4, damping=0.5),
+    spring("ground", (0.0, 1.5, 0.0), "arm", (0.3, 0.6, 0.3), 20.0, 0.3),
     TorsionSpring(joint="cyl", stiffness=3.0, damping=0.1, natural_angle=0.2),
     Force(body="arm7", point=(0.7, 0.5, 0.5), force=(1.0, -2.0, 3.0)),
     Moment(body="hand", moment=(0.3, 0.2, -0.1)),
@@ -77,10 +61,8 @@ LOADS: tuple[Load, ...] = (
 
 def every_joint(**changes) -> Scene:
     """Every joint and load kind; two loops, one closed by a distance joint, one by a spherical joint."""
-    scene = Scene(
-        name="every_joint", gravity=(0.3, -9.81, 1.0), duration=0.4, body=BODIES, joint=JOINTS, load=LOADS
-    )
-    return scene.with_(**changes)
+    parts = {"body": BODIES, "joint": JOINTS, "load": LOADS}
+    return Scene(name="every_joint", gravity=(0.3, -9.81, 1.0), duration=0.4, **parts).with_(**changes)
 
 
 def driven() -> Scene:
@@ -99,27 +81,21 @@ def driven() -> Scene:
 def ring(kind: str) -> Scene:
     """A planar four-bar in three dimensions whose last joint, of the given kind, is the one to cut. Fixed,
     revolute, cylindrical or universal: the planar motion is the same; the loop is redundant."""
-    z = (0.0, 0.0, 1.0)
-    last = JOINT_TYPES[kind].at("C", ("b", "c"), anchor=(0.7, 0.5, 0.0), axis=z, axes=(z, (0.0, 1.0, 0.0)))
+    last = JOINT_TYPES[kind].at("C", ("b", "c"), anchor=(0.7, 0.5, 0.0), axis=Z, axes=(Z, (0.0, 1.0, 0.0)))
+    spin = {"angular_velocity": (0.0, 0.0, 3.0)}
     return Scene(
         name=f"ring_{kind}",
         gravity=(0.0, -9.81, 0.0),
         duration=0.4,
         body=(
-            Body(
-                name="a",
-                mass=1.0,
-                inertia=(0.01, 0.02, 0.02),
-                position=(0.0, 0.15, 0.0),
-                angular_velocity=(0.0, 0.0, 3.0),
-            ),
+            Body(name="a", mass=1.0, inertia=(0.01, 0.02, 0.02), position=(0.0, 0.15, 0.0), **spin),
             Body(name="b", mass=2.0, inertia=(0.01, 0.05, 0.05), position=(0.35, 0.4, 0.0)),
             Body(name="c", mass=1.5, inertia=(0.02, 0.01, 0.02), position=(0.7, 0.25, 0.0)),
         ),
         joint=(
-            Revolute(name="A", bodies=("ground", "a"), anchor=(0.0, 0.0, 0.0), axis=z),
-            Revolute(name="B", bodies=("a", "b"), anchor=(0.0, 0.3, 0.0), axis=z),
-            Revolute(name="D", bodies=("ground", "c"), anchor=(0.7, 0.0, 0.0), axis=z),
+            hinge("A", "ground", "a", (0.0, 0.0, 0.0)),
+            hinge("B", "a", "b", (0.0, 0.3, 0.0)),
+            hinge("D", "ground", "c", (0.7, 0.0, 0.0)),
             last,
         ),
     )

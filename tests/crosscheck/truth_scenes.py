@@ -12,13 +12,11 @@ from mbref.scene import (
     Revolute,
     Scene,
     Sine,
-    Spring,
     TorsionSpring,
     Translational,
 )
 from mbref.scenes import SCENES
-
-Z = (0.0, 0.0, 1.0)
+from tests.helpers.parts import Z, spring
 
 
 def pendulum(**changes):
@@ -40,23 +38,10 @@ def block(**changes):
 
 def free(**changes):
     """A body with three different moments, spinning near its middle axis."""
-    body = Body(
-        name="body",
-        mass=2.0,
-        inertia=(0.2, 0.3, 0.4),
-        position=(1.0, 0.0, 0.0),
-        velocity=(0.0, 2.0, 1.0),
-        angular_velocity=(0.3, 5.0, 0.2),
-        orientation=tuple(rotations.from_vector(np.array([0.3, 0.2, 0.9]))),
-    )
+    pose = {"position": (1.0, 0.0, 0.0), "orientation": rotations.from_vector(np.array([0.3, 0.2, 0.9]))}
+    twist = {"velocity": (0.0, 2.0, 1.0), "angular_velocity": (0.3, 5.0, 0.2)}
+    body = Body(name="body", mass=2.0, inertia=(0.2, 0.3, 0.4), **pose, **twist)
     return Scene(**({"name": "free", "body": (body,)} | changes))
-
-
-def spring(first, start, second, stop, stiffness, natural_length):
-    """An undamped spring between two points."""
-    return Spring(
-        bodies=(first, second), points=(start, stop), stiffness=stiffness, natural_length=natural_length
-    )
 
 
 def swing(**changes):

@@ -49,6 +49,20 @@ def slide(name: str, first: str, second: str, at: Point, axis: Point = X, **fiel
     return joint(name, "translational", first, second, at, axis=list(axis), **fields)
 
 
+def spring(
+    first: str,
+    start: Point,
+    second: str,
+    stop: Point,
+    stiffness: float,
+    natural_length: float,
+    damping: float = 0.0,
+) -> Entry:
+    """Return a spring between points of two bodies (m, at t = 0)."""
+    ends = {"bodies": [first, second], "points": [start, stop], "natural_length": natural_length}
+    return {"type": "spring", **ends, "stiffness": stiffness, "damping": damping}
+
+
 def turning_about(anchor: Point, axis: Point, rate: float, body: Entry) -> Entry:
     """Return the body with the velocities of a rotation about a fixed axis."""
     spin = rate * np.array(axis) / np.linalg.norm(axis)
