@@ -19,7 +19,8 @@ ENGINES = "tests.helpers.still_engines"
 ROOT = Path(__file__).parents[3]
 PATIENCE = 60.0  # s in which a killed process disappears on a loaded machine
 RUN = """
-import sys
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell ignores it in jobs in the background
 from crosscheck.engine import Setting
 from crosscheck.processes.pool import run_isolated
 from tests.helpers.still_engines import resting
@@ -80,13 +81,22 @@ def test_child_process_that_is_killed_between_two_runs_is_replaced(log: Path):
     end_idle()
 
 
-@pytest.mark.parametrize("engine", ["LEAVES_A_PROGRAM", "WAITS_WITH_A_PROGRAM"])
-def test_programs_that_an_engine_started_end_when_the_parent_is_killed(engine: str, log: Path):
-    """The process of the engine and its program end, after the run and during it."""
+@pytest.mark.parametrize(
+    ("engine", "way"),
+    [
+        ("LOGGED", "end"),
+        ("LEAVES_A_PROGRAM", "SIGKILL"),
+        *(("WAITS_WITH_A_PROGRAM", name) for name in ("SIGINT", "SIGTERM", "SIGKILL")),
+    ],
+)
+def test_processes_of_an_engine_end_with_a_parent_that_ends_or_is_killed(engine: str, way: str, log: Path):
+    """The process of the engine and its program end, after the run and during it. A parent without a signal
+    ends when its standard input is closed."""
     command = [sys.executable, "-c", RUN, f"{ENGINES}:{engine}"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, cwd=ROOT) as parent:
         processes = numbers_in(log)
-        parent.kill()
+        if way != "end":
+            parent.send_signal(getattr(signal, way))
     assert all(map(is_gone, processes)), processes
 
 
