@@ -25,15 +25,13 @@ def crossing_of_circles(first, long, second, short, beside):
 
 
 def pins(crank, frame, angle):
-    """Return the four pins of the crossed four-bar at an angle of its crank, in the plane: the closed
-    form."""
+    """Return the four pins of the crossed four-bar at an angle of its crank, in the plane: closed form."""
     end, pivot = crank * np.array([np.cos(angle), np.sin(angle)]), np.array([frame, 0.0])
     return np.zeros(2), end, crossing_of_circles(end, frame, pivot, crank, end + pivot), pivot
 
 
 def drawn(seed):
-    """Return random lengths (m) of crank and frame, angle (rad) and rate (rad/s) of the crank at the
-    start."""
+    """Return random lengths (m) of crank and frame, angle (rad) and rate (rad/s) of the crank at first."""
     rng = np.random.default_rng([seed, 7])
     rate = rng.uniform(2.0, 8.0) * rng.choice([-1, 1])
     return rng.uniform(0.1, 0.4), rng.uniform(0.45, 0.8), rng.uniform(0.2, 2.8), rate

@@ -114,8 +114,7 @@ def forked(work: Callable[[], None]) -> BaseProcess:
 
 
 def test_a_killed_writer_leaves_a_whole_file(tmp_path: Path, capfd):
-    """A megabyte of one digit is written again and again; after each of five kills the file has one digit
-    only."""
+    """A megabyte of one digit is written again and again; after each of five kills it has one digit only."""
     path = tmp_path / "a"
     checked_file.write(path, b"0" * 1_000_000)
 
@@ -133,15 +132,18 @@ def test_a_killed_writer_leaves_a_whole_file(tmp_path: Path, capfd):
     assert capfd.readouterr().err == ""
 
 
+def compiling(cache: Path) -> dict[str, str]:
+    """Return the environment of a process that compiles, and has its cache in a folder."""
+    return {k: v for k, v in os.environ.items() if k != "NUMBA_DISABLE_JIT"} | {"NUMBA_CACHE_DIR": str(cache)}
+
+
 def ran(script: str, folder: Path, cache: Path) -> tuple[str, str]:
     """Return the output and errors of a program that ends with status 0 and has its cache in a folder."""
     file = folder / "program.py"
     if not file.exists():
         file.write_text(script.format(root=str(ROOT)))
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
-    environment.pop("NUMBA_DISABLE_JIT", None)
     command = [sys.executable, str(file), str(cache)]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, env=compiling(cache), capture_output=True, text=True, check=False)
     assert done.returncode == 0, done
     return done.stdout, done.stderr
 
@@ -196,19 +198,16 @@ def test_one_of_two_processes_compiles_a_kernel(tmp_path: Path):
     """The number of compilations is printed by each: one compiles, the other waits and loads the result."""
     cache, program = tmp_path / "cache", tmp_path / "program.py"
     program.write_text(SMALL_KERNEL.format(root=str(ROOT)) + COUNT_COMPILATIONS)
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
-    environment.pop("NUMBA_DISABLE_JIT", None)
-    command = [sys.executable, str(program)]
-    both = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    command, env = [sys.executable, str(program)], compiling(cache)
+    both = [subprocess.Popen(command, env=env, stdout=subprocess.PIPE, text=True) for _ in range(2)]
     said = [process.communicate()[0] for process in both]
     assert sorted(said) == ["7.0\n0\n", "7.0\n1\n"]
 
 
 @pytest.mark.parametrize("program", ["mbref", "crosscheck"])
 def test_printing_help_creates_no_cache(program, tmp_path: Path):
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     command = [sys.executable, "-m", program, "--help"]
-    subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, check=True)
+    subprocess.run(command, env=compiling(tmp_path / "cache"), cwd=ROOT, capture_output=True, check=True)
     assert not (tmp_path / "cache").exists()
 
 

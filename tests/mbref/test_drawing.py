@@ -17,6 +17,7 @@ from mbref.motions.drawing.timeline import Timeline
 from mbref.motions.drawing.view import Page, View, view_of
 from mbref.scene import JOINT_TYPES, Scene
 from mbref.scenes import SCENES
+from tests.helpers.parts import X, Y, Z, spring
 
 CLEAR = 3.5  # px, least distance between a bar's middle line, 6 px wide, and the box of a name
 SVG = "{http://www.w3.org/2000/svg}"
@@ -77,11 +78,14 @@ def test_names_in_a_picture_do_not_overlap(name):
     assert len(found) > 1 and not overlapping(found)
 
 
+def lines_of(root: ET.Element) -> list[ET.Element]:
+    """Return the lines of bars in a part of a picture: they are 6 px wide."""
+    return [node for node in root.iter(f"{SVG}polyline") if node.get("stroke-width") == "6"]
+
+
 def bars(picture: str) -> list[np.ndarray]:
-    """Return the ends (2, 2), px, of the parts of bars: lines of a width of 6 px."""
-    lines = [
-        node for node in ET.fromstring(picture).iter(f"{SVG}polyline") if node.get("stroke-width") == "6"
-    ]
+    """Return the ends (2, 2), px, of the parts of bars."""
+    lines = lines_of(ET.fromstring(picture))
     points = [np.array([p.split(",") for p in line.attrib["points"].split()], dtype=float) for line in lines]
     return [line[i : i + 2] for line in points for i in range(len(line) - 1)]
 
@@ -128,11 +132,7 @@ def test_bars_of_an_animation_keep_their_length_in_every_frame(turning):
     """The mechanism turns as one rigid body: lengths in px change by less than three times the 0.1 px to
     which coordinates are printed, while ends move by more than 50 px."""
     scene, motion = turning
-    lines = [
-        node
-        for node in ET.fromstring(moving(scene, motion)).find(f"{SVG}g").iter(f"{SVG}polyline")
-        if node.get("stroke-width") == "6"
-    ]
+    lines = lines_of(ET.fromstring(moving(scene, motion)).find(f"{SVG}g"))
     assert len(lines) == len(scene.body)
     for line in lines:
         values = line.find(f"{SVG}animate").attrib["values"].split(";")
@@ -192,11 +192,7 @@ def test_motions_side_by_side_share_scale_and_time_and_a_shorter_one_stops(turni
     assert {"whole", "<part>", "again"} <= set(texts(picture)) and root.find(f"{SVG}title").text == "three"
     panels = list(root.find(f"{SVG}g").findall(f"{SVG}svg"))
     frames = [
-        [
-            line.find(f"{SVG}animate").attrib["values"].split(";")
-            for line in panel.iter(f"{SVG}polyline")
-            if line.get("stroke-width") == "6"
-        ]
+        [line.find(f"{SVG}animate").attrib["values"].split(";") for line in lines_of(panel)]
         for panel in panels
     ]
     assert frames[0] == frames[2] and len(frames[0]) == len(scene.body)
@@ -247,12 +243,7 @@ def test_page_shows_all_points_within_its_margins():
 
 def test_every_joint_type_is_drawn_by_a_sign_of_its_own():
     assert set(SIGNS) == set(JOINT_TYPES)
-    ends = {
-        "anchor": [1.0, 0, 0],
-        "anchors": [[1.0, 0, 0], [2.0, 0, 0]],
-        "axis": [0, 0, 1.0],
-        "axes": [[0, 0, 1.0], [0, 1.0, 0]],
-    }
+    ends = {"anchor": X, "anchors": [X, [2.0, 0, 0]], "axis": Z, "axes": [Z, Y]}
     bodies = [{"name": n, "position": [x, 0.2, 0.1]} for n, x in (("a", 0.5), ("b", 1.5))]
     pictures = set()
     for joint in JOINT_TYPES.values():
@@ -270,21 +261,11 @@ def test_every_load_and_driver_has_a_picture_of_its_own():
         {"type": "force", "body": "rod", "point": [0.5, 0, 0], "force": [0, 1, 0]},
         {"type": "moment", "body": "crank", "moment": [0, 0, -1]},
         {"type": "moment", "body": "crank", "moment": [0, 0, 1]},
-        {
-            "type": "spring",
-            "bodies": ["ground", "slider"],
-            "points": [[1, 0, 0], [0.7, 0, 0]],
-            "stiffness": 1,
-            "natural_length": 1,
-        },
+        spring("ground", (1, 0, 0), "slider", (0.7, 0, 0), 1.0, 1.0),
         {"type": "torsion_spring", "joint": "A", "stiffness": 1},
     ]
     pictures = {still(scene.with_(load=(load,))) for load in loads}
-    drivers = [
-        {"joint": "A", "polynomial": [0.0, 1.0]},
-        {"joint": "A", "polynomial": [0.0, -1.0]},
-        {"joint": "D", "polynomial": [0.0, 1.0]},
-    ]
+    drivers = [{"joint": joint, "polynomial": [0.0, rate]} for joint, rate in (("A", 1), ("A", -1), ("D", 1))]
     pictures |= {still(scene.with_(driver=(driver,))) for driver in drivers} | {still(scene)}
     assert len(pictures) == len(loads) + len(drivers) + 1
 

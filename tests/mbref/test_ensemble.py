@@ -85,8 +85,7 @@ def test_another_process_reports_all_faults_of_a_scene():
 
 
 def test_random_numbers_of_variants_have_the_requested_distributions():
-    """Mean of 400 numbers to 4 standard errors, 4 σ / √400; standard deviation to 15 %; no correlation above
-    0.2."""
+    """Mean of 400 numbers to 4 standard errors, 4 σ / √400; deviation to 15 %; no correlation above 0.2."""
     scenes = list(variants(DRIVEN, VARY, 400, seed=3))
     x = np.array([scene.joint[1].anchor[0] for scene in scenes])
     mass = np.array([scene.body[2].mass for scene in scenes])

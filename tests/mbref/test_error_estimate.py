@@ -8,12 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from crosscheck.conformance.mechanisms.parts import linkage
 from mbref import ErrorEstimate, Limits, Motion, Scene, simulate, with_error_estimate
 from mbref.cli.commands import main
 from mbref.motions.trajectory import Cost, Outcome
 from mbref.records import strict_json
-from mbref.scene import Body, Driver, Revolute, Spring, Translational
+from mbref.scene import Driver
 from mbref.simulation.second_run import perturbed
+from tests.helpers.parts import slide, spring
+from tests.helpers.statics import rod
 
 TIMES = np.array([0.0, 0.5, 1.0, 1.5])
 UNIT = 2.0**-52  # relative distance of neighbouring doubles
@@ -23,74 +26,27 @@ def estimate(*errors: float, rtol: float | None = 1e-9, **more) -> ErrorEstimate
     return ErrorEstimate(TIMES, np.array(errors), rtol, "taylor", **more)
 
 
-def rod(name: str, start: tuple[float, float], stop: tuple[float, float]) -> Body:
-    """Return a rod of 1 kg in the xy-plane, its frame parallel to the world's."""
-    way = np.subtract(stop, start)
-    x, y = ((np.array(start) + stop) / 2).tolist()
-    long = float(way @ way) / 12
-    return Body(name=name, mass=1.0, inertia=(long, long, 1.1 * long), position=(x, y, 0.0))
-
-
-def pin(name: str, first: str, second: str, x: float, y: float) -> Revolute:
-    return Revolute(name=name, bodies=(first, second), anchor=(x, y, 0.0), axis=(0.0, 0.0, 1.0))
-
-
 @pytest.fixture(scope="module")
 def pendulums() -> Scene:
     """Three rods in a row, released from a horizontal line: chaotic."""
-    return Scene(
-        name="pendulums",
-        gravity=(0.0, -9.81, 0.0),
-        duration=8.0,
-        body=tuple(rod(f"rod{k}", (0.4 * k, 0.0), (0.4 * k + 0.4, 0.0)) for k in range(3)),
-        joint=tuple(
-            pin(f"P{k}", f"rod{k - 1}" if k else "ground", f"rod{k}", 0.4 * k, 0.0) for k in range(3)
-        ),
-    )
+    row = linkage("pendulums", [(0.4 * k, 0.0, 0.0) for k in range(4)])
+    return row.with_(joint=row.joint[:-1], duration=8.0)
 
 
 @pytest.fixture(scope="module")
 def oscillator() -> Scene:
     """A mass of 1 kg on a spring of 100 N/m, 0.2 m from its place of rest: x = 1 + 0.2 cos 10 t."""
-    return Scene(
-        name="oscillator",
-        duration=1.0,
-        body=(Body(name="mass", mass=1.0, inertia=(0.01, 0.01, 0.01), position=(1.2, 0.0, 0.0)),),
-        joint=(
-            Translational(name="D", bodies=("ground", "mass"), anchor=(0.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0)),
-        ),
-        load=(
-            Spring(
-                bodies=("ground", "mass"),
-                points=((0.0, 0.0, 0.0), (1.2, 0.0, 0.0)),
-                stiffness=100.0,
-                damping=0.0,
-                natural_length=1.0,
-            ),
-        ),
-    )
+    start, origin = (1.2, 0.0, 0.0), (0.0, 0.0, 0.0)
+    body, guide = rod("mass", start, 1.0, 0.01), slide("D", "ground", "mass", origin)
+    pull = spring("ground", origin, "mass", start, 100.0, 1.0)
+    return Scene(name="oscillator", duration=1.0, body=[body], joint=[guide], load=[pull])
 
 
 @pytest.fixture(scope="module")
 def dead() -> Scene:
     """A driven crank of 0.5 m that cannot turn: the other bars reach 0.5 m + 0.5 m, to a hinge at 1.2 m."""
-    return Scene(
-        name="dead",
-        gravity=(0.0, -9.81, 0.0),
-        duration=1.0,
-        body=(
-            rod("crank", (0.0, 0.0), (0.5, 0.0)),
-            rod("coupler", (0.5, 0.0), (0.8, 0.4)),
-            rod("rocker", (1.2, 0.0), (0.8, 0.4)),
-        ),
-        joint=(
-            pin("A", "ground", "crank", 0.0, 0.0),
-            pin("B", "crank", "coupler", 0.5, 0.0),
-            pin("C", "coupler", "rocker", 0.8, 0.4),
-            pin("D", "ground", "rocker", 1.2, 0.0),
-        ),
-        driver=(Driver(joint="A", polynomial=(0.0, 2.0)),),
-    )
+    bars = linkage("dead", [(0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (0.8, 0.4, 0.0), (1.2, 0.0, 0.0)])
+    return bars.with_(duration=1.0, driver=(Driver(joint="P0", polynomial=(0.0, 2.0)),))
 
 
 def test_sentence_of_an_estimate_states_the_largest_error_and_when_it_exceeds_rtol():
@@ -183,9 +139,7 @@ def test_start_of_the_second_run_differs_by_rounding_and_keeps_zeros(pendulums):
     equally in each call."""
 
     def numbers(scene: Scene) -> np.ndarray:
-        fields = [body.position + body.inertia for body in scene.body] + [
-            j.anchor + j.axis for j in scene.joint
-        ]
+        fields = [b.position + b.inertia for b in scene.body] + [j.anchor + j.axis for j in scene.joint]
         return np.array([x for numbers in (scene.gravity, *fields) for x in numbers])
 
     before, after = numbers(pendulums), numbers(perturbed(pendulums))
@@ -234,8 +188,7 @@ def test_error_of_a_motion_by_another_engine_cannot_be_estimated(pendulums):
 
 
 def test_estimate_is_written_only_after_it_was_requested(pendulums, tmp_path):
-    """Record, columns and CSV file have no estimate before ``with_error_estimate``, and its values
-    after."""
+    """Record, columns and CSV file have no estimate before ``with_error_estimate``, its values after."""
     motion = simulate(pendulums, duration=0.5)
     assert motion.to_record()["error_estimate"] is None and "error_estimate" not in motion.columns()
     motion = with_error_estimate(motion)

@@ -12,8 +12,7 @@ from tests.helpers.formulations import solve
 
 
 def system(m, n, redundant, seed=20031):
-    """Return random M, Φ_q (m, n) of rank m - redundant, g, a consistent γ, and q̈ by the dense KKT
-    system."""
+    """Return random M, Φ_q (m, n) of rank m - redundant, g, a consistent γ, and q̈ by the KKT system."""
     rng = np.random.default_rng([m, n, redundant, seed])
     mass = rng.uniform(0.1, 10, n)
     jacobian = rng.normal(size=(m, n))

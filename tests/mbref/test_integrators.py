@@ -138,8 +138,7 @@ def evaluations_for(error, runs):
 
 @pytest.mark.parametrize("name", REDUCED)
 def test_adams_needs_at_most_a_quarter_more_evaluations_than_scipy_s_codes(name):
-    """Evaluations for an error of 1e-6 against the closed form; LSODA and VODE solve the one reduced
-    equation."""
+    """Evaluations for an error of 1e-6 against the closed form; LSODA and VODE solve the reduced equation."""
     error_of, *problem = REDUCED[name]
     times, tolerances = np.array([0.0, problem[2]]), 10.0 ** -np.arange(4, 12, 2)
     runs = [error_of("mpi-svd+projection/adams", times, rtol=rtol) for rtol in tolerances]

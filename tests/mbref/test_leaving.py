@@ -40,8 +40,7 @@ def test_no_method_without_projection_completes_on_another_motion(name, method):
 
 
 def test_run_that_left_its_motion_ends_at_the_first_wrong_sample():
-    """Without comparison the same run goes on, and its error against the closed form passes 1000 rtol
-    there."""
+    """Without comparison the run goes on, and its error against the closed form passes 1000 rtol there."""
     scene, end = SCENES["four_bar"]
     times = np.linspace(0.0, end, 31)
     run = simulate(scene, "mpi-gs+none", times, Limits(rtol=1e-6))

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from mbref.cli import main
-from mbref.scenes import SCENES
-from mbref.simulation.simulate import simulate
 from mbref.stepping.limits import Limits
 
 NUMBERS = (
@@ -58,12 +56,6 @@ def test_numpy_numbers_are_stored_as_python_floats_and_integers():
     limits = Limits(rtol=np.float32(0.5), atol=np.int64(1), most_steps=np.int32(7))
     assert [type(x) for x in (limits.rtol, limits.atol, limits.most_steps)] == [float, float, int]
     assert limits == Limits(rtol=0.5, atol=1.0, most_steps=7)
-
-
-@pytest.mark.parametrize("times", [[10**400], ["x"], [[0.0], [1.0, 2.0]], [math.nan], [1.0, 1.0]], ids=repr)
-def test_times_that_are_no_rising_finite_numbers_are_refused(times):
-    with pytest.raises(ValueError, match=r"^times: "):
-        simulate(SCENES["four_bar"](), "alf-dual+projection", times)
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,5 @@
 """Names with the characters of markup, paths and other alphabets, in tables and on command lines."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -38,15 +35,6 @@ def test_run_s_table_shows_a_name_literally(name: str, capsys: pytest.CaptureFix
     show(scene, Motion.of(scene, run))
     out = capsys.readouterr().out
     assert out.count(name.strip()) >= 4, out
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_diagnosis_shows_a_name_literally(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    """The scene is read from a file that ``save`` wrote."""
-    body = Body(name=name, mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
-    Scene(name=name, body=(body,)).save(tmp_path / "scene.toml")
-    assert main(["diagnose", str(tmp_path / "scene.toml"), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["scene"] == name
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from mbref.scene import Body, Driver, Fixed, Revolute, Scene, Spring, Translational
+from mbref.scene import Body, Driver, Fixed, Scene, Translational
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
+from tests.helpers.parts import X, hinge, joint, spring
 
 METHOD = "alf-dual+projection"
-ORIGIN, X, Z = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+ORIGIN = (0.0, 0.0, 0.0)
 GRAVITY = {"gravity": (0.0, -9.81, -3.0), "duration": 0.5}
 
 
@@ -20,42 +21,18 @@ def guide(name, bodies, x):
     return Translational(name=name, bodies=bodies, anchor=(x, 0.0, 0.0), axis=X)
 
 
-def oblique(body):
-    """A spring from above and beside that also turns the body."""
-    points = ((0.3, 0.5, 0.2), (0.02, 0.01, 0.03))
-    return Spring(bodies=("ground", body), points=points, stiffness=20.0, natural_length=0.3)
+def pushed(name, bodies, joints, body):
+    """A scene with a spring from above and beside that also turns one of its bodies."""
+    oblique = spring("ground", (0.3, 0.5, 0.2), body, (0.02, 0.01, 0.03), 20.0, 0.3)
+    return Scene(name=name, body=bodies, joint=joints, load=(oblique,), **GRAVITY)
 
 
-RAIL = Scene(
-    name="rail",
-    body=(block("slide", 0.0),),
-    joint=(guide("guide", ("ground", "slide"), 0.0),),
-    load=(oblique("slide"),),
-    **GRAVITY,
-)
+RAIL = pushed("rail", [block("slide", 0.0)], [guide("guide", ("ground", "slide"), 0.0)], "slide")
 TWO_GUIDES = RAIL.with_(name="two_guides", joint=(*RAIL.joint, guide("other", ("ground", "slide"), 0.4)))
-SLEEVE = Scene(
-    name="sleeve",
-    body=(block("arm", 0.1), block("sleeve", 0.3)),
-    joint=(
-        Revolute(name="pin", bodies=("ground", "arm"), anchor=ORIGIN, axis=Z),
-        guide("guide", ("arm", "sleeve"), 0.3),
-    ),
-    load=(oblique("sleeve"),),
-    **GRAVITY,
-)
-WELD = Scene(
-    name="weld",
-    body=(block("a", 0.0), block("b", 1.0)),
-    joint=(
-        Fixed(name="root", bodies=("ground", "a"), anchor=ORIGIN),
-        Fixed(name="tip", bodies=("a", "b"), anchor=(0.5, 0.0, 0.0)),
-    ),
-    load=(oblique("b"),),
-    **GRAVITY,
-)
-
-
+PINNED = [hinge("pin", "ground", "arm", ORIGIN), guide("guide", ("arm", "sleeve"), 0.3)]
+SLEEVE = pushed("sleeve", [block("arm", 0.1), block("sleeve", 0.3)], PINNED, "sleeve")
+WELDS = [joint("root", "fixed", "ground", "a"), joint("tip", "fixed", "a", "b", (0.5, 0.0, 0.0))]
+WELD = pushed("weld", [block("a", 0.0), block("b", 1.0)], WELDS, "b")
 MECHANISMS = (SCENES["spatial_slider_crank_gravity"](), RAIL, SLEEVE, WELD, TWO_GUIDES)
 
 
@@ -68,25 +45,17 @@ def test_motion_and_reactions_by_alf_dual_equal_those_by_the_dense_pseudo_invers
     other = simulate(scene, "mpi-svd+none", times, Limits(rtol=1e-11))
     assert one.outcome.name == other.outcome.name == "COMPLETED", one.message
     np.testing.assert_allclose(one.position, other.position, atol=1e-8)
-    for joint, reaction in one.reactions.items():
-        size = np.abs(other.reactions[joint]).max()
-        np.testing.assert_allclose(reaction, other.reactions[joint], atol=1e-5 * size, err_msg=joint)
+    for name, reaction in one.reactions.items():
+        size = np.abs(other.reactions[name]).max()
+        np.testing.assert_allclose(reaction, other.reactions[name], atol=1e-5 * size, err_msg=name)
 
 
 def test_driver_of_a_welded_joint_ends_the_run_before_it_turns_anything():
     """The driver's angle 5 t² and rate are zero at the start, which is therefore consistent; after 1 ms the
     angle would be 5e-6 rad."""
-    scene = Scene(
-        name="against",
-        body=(block("a", 0.0), block("b", 1.0)),
-        joint=(
-            Revolute(name="p", bodies=("ground", "a"), anchor=ORIGIN, axis=Z),
-            Fixed(name="w", bodies=("ground", "a"), anchor=ORIGIN),
-            Revolute(name="r", bodies=("a", "b"), anchor=(0.5, 0.0, 0.0), axis=Z),
-        ),
-        driver=(Driver(joint="p", polynomial=(0.0, 0.0, 5.0)),),
-        **GRAVITY,
-    )
+    joints = [hinge("p", "ground", "a", ORIGIN), WELDS[0], hinge("r", "a", "b", (0.5, 0.0, 0.0))]
+    driver = Driver(joint="p", polynomial=(0.0, 0.0, 5.0))
+    scene = Scene(name="against", body=WELD.body, joint=joints, driver=(driver,), **GRAVITY)
     run = simulate(scene, METHOD, [0.0, 0.2])
     assert run.outcome.label == "NOT_CONVERGED" and run.t_end < 1e-3, run.message
 

@@ -123,8 +123,7 @@ def test_small_bead_on_an_arm_swings_without_a_singular_position(inertia):
 def test_swing_that_turns_back_before_the_flat_position_meets_its_closed_form_and_crosses_nothing(
     loop, distance
 ):
-    """A parallelogram released ``distance`` (rad) from the flat pose, on the side from which it swings
-    back."""
+    """A parallelogram released ``distance`` (rad) from the flat pose, on the side where it swings back."""
     scene = SWINGING[loop](-distance)
     run = simulate(scene, "taylor", np.linspace(0.0, 1.5, 9))
     assert relative_error(run, scene) < 10 * RTOL and run.crossings == ()
@@ -207,8 +206,7 @@ def test_motion_from_very_near_the_flat_position_is_undecided_at_its_start(loop,
 
 @pytest.mark.parametrize("gap", [1e-2, 1e-5, 1e-8, 1e-10])
 def test_slider_crank_with_a_longer_rod_turns_past_its_dead_centre_as_its_closed_form(gap):
-    """The rod is longer than the crank by the gap (m), so that two branches do not meet, apart by about
-    √gap."""
+    """The rod is longer than the crank by the gap (m), so that branches do not meet, apart by about √gap."""
     scene = slider_crank(0.308, 0.308 + gap, 0.3, "gap", rate=30.0)
     assert error_of(scene, 0.25) < RTOL
 

@@ -65,8 +65,7 @@ def test_run_that_watches_the_rank_ends_at_the_first_singular_position(loop, met
     ids=lambda scene: scene.name,
 )
 def test_message_names_the_joints_that_lose_rank(scene):
-    """All joints of a loop take part where its links are in line, and the three loops of a chain are flat at
-    once."""
+    """All joints of a loop take part where its links are in line; three loops of a chain are flat at once."""
     message = simulate(scene, "alf-dual+projection", [2.0]).message
     assert all(repr(joint.name) in message for joint in scene.joint), message
 
@@ -130,8 +129,7 @@ def test_chain_of_slider_cranks_completes_though_single_pivots_vanish(loops, rto
 
 @pytest.mark.parametrize("distance", [3e-2, 1e-1])
 def test_swing_that_turns_back_before_the_flat_position_is_completed_by_projection(distance):
-    """Released ``distance`` (rad) from it; nothing is crossed, and the closed form is met to 1000 times rtol,
-    1e-9."""
+    """Released ``distance`` (rad) from it; nothing is crossed; the closed form is met to 1000 rtol, 1e-9."""
     scene = four_bar_gravity(-distance)
     run = simulate(scene, "alf-dual+projection", np.linspace(0.0, 1.5, 9))
     assert relative_error(run, scene) < 1e-6 and run.crossings == ()

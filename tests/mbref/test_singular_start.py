@@ -12,6 +12,7 @@ from mbref.scenes.four_bar import four_bar
 from mbref.scenes.planar_slider_crank import slider_crank
 from tests.crosscheck.measured import relative_error
 from tests.helpers import parts
+from tests.helpers.statics import rod
 
 UPRIGHT = math.pi / 2  # rad: crank and rod of equal lengths lie on each other
 RTOL = 1e-9
@@ -151,16 +152,7 @@ def spherical_loop(crank: float, coupler: float, angle: float, rates: tuple[floa
         ("rod", a + c, None),
         ("rocker", last + c, rates[1] * last),
     )
-    bodies = [
-        {
-            "name": name,
-            "mass": 1.0,
-            "inertia": (0.1, 0.1, 0.1),
-            "position": 0.4 * place,
-            "angular_velocity": rate,
-        }
-        for name, place, rate in links
-    ]
+    bodies = [{**rod(name, 0.4 * place, 1.0, 0.1), "angular_velocity": rate} for name, place, rate in links]
     pairs = ((GROUND, "crank"), ("crank", "rod"), ("rod", "rocker"), (GROUND, "rocker"))
     pins = [
         parts.hinge(n, *pair, x, x) for n, pair, x in zip("ABCD", pairs, (first, a, c, last), strict=True)

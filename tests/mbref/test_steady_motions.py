@@ -7,6 +7,8 @@ import pytest
 
 from mbref import Scene, SceneError, equilibria
 from mbref.cli.commands import main
+from tests.helpers.parts import X, Y, joint, slide
+from tests.helpers.statics import ORIGIN, hinge, rod
 
 G, MASS, LENGTH, OWN = 9.81, 1.5, 0.5, 0.02  # m/s², kg, m, kg m²
 ACCURACY = 1e-9  # N, m, m/s, rad; Newton's method ends at forces of about 1e-12 N
@@ -14,15 +16,8 @@ ACCURACY = 1e-9  # N, m, m/s, rad; Newton's method ends at forces of about 1e-12
 
 def turning_pendulum(rate: float, axis=(0.0, 0.0, 1.0), **changes) -> Scene:
     """Return a ball on an arm of 0.5 m that hangs from a turning spindle by a hinge about the y axis."""
-    bodies = [
-        {"name": "spindle", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.0] * 3},
-        {"name": "ball", "mass": MASS, "inertia": [OWN] * 3, "position": [0.3, 0.0, -0.4]},
-    ]
-    hinge = {"type": "revolute", "anchor": [0.0] * 3}
-    joints = [
-        {**hinge, "name": "A", "bodies": ["ground", "spindle"], "axis": list(axis)},
-        {**hinge, "name": "B", "bodies": ["spindle", "ball"], "axis": [0.0, 1.0, 0.0]},
-    ]
+    bodies = [rod("spindle", ORIGIN, 1.0, 0.1), rod("ball", (0.3, 0.0, -0.4), MASS, OWN)]
+    joints = [hinge("A", ("ground", "spindle"), axis=axis), hinge("B", ("spindle", "ball"), axis=Y)]
     driver = [{"joint": "A", "polynomial": [0.0, rate]}]
     given = {"gravity": (0.0, 0.0, -G), "body": bodies, "joint": joints, "driver": driver}
     return Scene(name="turning_pendulum", **given | changes)
@@ -74,17 +69,10 @@ def test_coriolis_forces_couple_two_slides_of_a_turning_table():
     k₂/m - Ω²) + 4 Ω² s², here to 1e-7, as the cross between the slides has a mass of 1e-9 kg. The motion is
     unstable if Ω², here 9 s⁻², lies between both values of k/m."""
     rate = 3.0
-    bodies = [
-        {"name": "table", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.0] * 3},
-        {"name": "cross", "mass": 1e-9, "inertia": [1e-9] * 3, "position": [0.0] * 3},
-        {"name": "ball", "mass": 1.0, "inertia": [0.02] * 3, "position": [0.0] * 3},
-    ]
-    slide = {"type": "translational", "anchor": [0.0] * 3}
-    joints = [
-        {**slide, "name": "A", "type": "revolute", "bodies": ["ground", "table"], "axis": [0.0, 0.0, 1.0]},
-        {**slide, "name": "X", "bodies": ["table", "cross"], "axis": [1.0, 0.0, 0.0]},
-        {**slide, "name": "Y", "bodies": ["cross", "ball"], "axis": [0.0, 1.0, 0.0]},
-    ]
+    sizes = {"table": (1.0, 0.1), "cross": (1e-9, 1e-9), "ball": (1.0, 0.02)}  # kg, kg m²
+    bodies = [rod(name, ORIGIN, *size) for name, size in sizes.items()]
+    slides = slide("X", "table", "cross", ORIGIN, X), slide("Y", "cross", "ball", ORIGIN, Y)
+    joints = [hinge("A", ("ground", "table")), *slides]
     for stiffness, is_stable in (((20.0, 25.0), True), ((4.0, 25.0), False)):
         loads = [
             {"type": "slide_spring", "joint": name, "stiffness": k, "damping": 0.0}
@@ -105,14 +93,9 @@ def test_a_body_on_a_ball_joint_has_the_roots_of_eulers_equations():
     A) (C - B) / (A B). The angle about the axis is free: a double eigenvalue of zero, which rounding splits
     by its square root."""
     rate, (a, b, c) = 5.0, (0.02, 0.03, 0.045)
-    bodies = [
-        {"name": "spindle", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.0, 0.0, 1.0]},
-        {"name": "body", "mass": 1.0, "inertia": [a, b, c], "position": [0.0] * 3},
-    ]
-    joints = [
-        turning_pendulum(rate).joint[0],
-        {"name": "B", "type": "spherical", "bodies": ["spindle", "body"], "anchor": [0.0] * 3},
-    ]
+    turned = {"name": "body", "mass": 1.0, "inertia": [a, b, c], "position": ORIGIN}
+    bodies = [rod("spindle", (0.0, 0.0, 1.0), 1.0, 0.1), turned]
+    joints = [turning_pendulum(rate).joint[0], joint("B", "spherical", "spindle", "body")]
     scene = turning_pendulum(rate, body=bodies, joint=joints, gravity=(0.0, 0.0, 0.0))
     [each] = equilibria(scene, starts=1)
     slow = rate * np.sqrt((c - a) * (c - b) / (a * b))
@@ -122,35 +105,17 @@ def test_a_body_on_a_ball_joint_has_the_roots_of_eulers_equations():
     assert np.sort(np.abs(each.eigenvalues))[:2].max() < 1e-4
 
 
+PUSH = {"type": "force", "body": "ball", "point": [0.3, 0.0, -0.4], "force": [1.0, 0.0, 0.0]}
+TIE = joint("C", "distance", "ground", "ball", anchors=[[1.0, 1.0, 0.0], [0.3, 0.0, -0.4]])
+JOINTS = [*turning_pendulum(1.0).joint, TIE]
+BODIES = [*turning_pendulum(1.0).body, rod("free", (0.0, 0.0, 5.0), 1.0, 0.1)]
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (
-            {
-                "load": [
-                    {"type": "force", "body": "ball", "point": [0.3, 0.0, -0.4], "force": [1.0, 0.0, 0.0]}
-                ]
-            },
-            "loads",
-        ),
-        (
-            {
-                "joint": [
-                    *turning_pendulum(1.0).joint[:2],
-                    {
-                        "name": "C",
-                        "type": "distance",
-                        "bodies": ["ground", "ball"],
-                        "anchors": [[1.0, 1.0, 0.0], [0.3, 0.0, -0.4]],
-                    },
-                ],
-                "body": [
-                    *turning_pendulum(1.0).body,
-                    {"name": "free", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.0, 0.0, 5.0]},
-                ],
-            },
-            "joint 'C' does not turn with it",
-        ),
+        ({"load": [PUSH]}, "loads"),
+        ({"joint": JOINTS, "body": BODIES}, "joint 'C' does not turn with it"),
     ],
 )
 def test_motions_that_are_not_steady_are_refused_with_the_cause(change, says):

@@ -8,9 +8,10 @@ from scipy.integrate import solve_ivp
 from crosscheck.conformance.mechanisms.closed_forms import CLOSED_FORMS, pendulum, torsion
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
-from mbref.scene import Body, Revolute, Scene, Spring
+from mbref.scene import Body, Scene
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
+from tests.helpers.parts import hinge, spring
 
 FINE = Limits(rtol=1e-12)
 
@@ -43,13 +44,8 @@ def test_error_by_series_is_a_fiftieth_to_a_ten_thousandth_of_the_tolerance(form
 def test_quaternion_of_a_spinning_body_is_continuous_over_full_turns(axis):
     """A body that spins about a principal axis by 4 π: its quaternion is that of the angle, sign and all."""
     spin, times = 10.0, np.linspace(0.0, 0.4 * np.pi, 41)
-    body = Body(
-        name="b",
-        mass=2.0,
-        inertia=(0.1, 0.2, 0.25),
-        position=(0.0, 0.0, 0.0),
-        angular_velocity=tuple(spin * a for a in axis),
-    )
+    pose = {"position": (0.0, 0.0, 0.0), "angular_velocity": tuple(spin * a for a in axis)}
+    body = Body(name="b", mass=2.0, inertia=(0.1, 0.2, 0.25), **pose)
     run = simulate(Scene(name="spinning", body=(body,)), "taylor", times, FINE)
     half = 0.5 * spin * times
     exact = np.column_stack([np.cos(half), np.outer(np.sin(half), axis)])
@@ -74,10 +70,8 @@ def angle_of_bar(beside: float, duration: float) -> float:
     ``beside`` - 0.4 m, where the integration stops and begins again."""
 
     def rates(t, y):
-        tip, turned = (
-            0.4 * np.array([np.cos(y[0]), np.sin(y[0])]),
-            0.4 * np.array([-np.sin(y[0]), np.cos(y[0])]),
-        )
+        tip = 0.4 * np.array([np.cos(y[0]), np.sin(y[0])])
+        turned = np.array([-tip[1], tip[0]])
         vector = tip - [beside - 0.4, 0.0]
         length = np.sqrt(vector @ vector)
         return y[1], -20.0 * (1.0 - 0.3 / length) * (vector @ turned) / (0.0133 + 0.04)
@@ -92,24 +86,14 @@ def angle_of_bar(beside: float, duration: float) -> float:
     return solve_ivp(rates, (first.t[-1], duration), behind, **options).y[0, -1]
 
 
-def sprung_bar(speed: float, ends: tuple, **spring: float) -> Scene:
-    """Return a bar that turns on a hinge at a speed (rad/s), with a spring between the ground and it."""
-    bar = Body(
-        name="bar",
-        mass=1.0,
-        inertia=(0.001, 0.0133, 0.0133),
-        position=(0.2, 0.0, 0.0),
-        velocity=(0.0, 0.2 * speed, 0.0),
-        angular_velocity=(0.0, 0.0, speed),
-    )
-    bodies = ("ground", "bar")
-    return Scene(
-        name="meeting",
-        body=(bar,),
-        duration=0.7,
-        joint=(Revolute(name="A", bodies=bodies, anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),),
-        load=(Spring(bodies=bodies, points=ends, stiffness=20.0, **spring),),
-    )
+def sprung_bar(speed: float, place: float, natural_length: float, damping: float = 0.0) -> Scene:
+    """Return a bar that turns on a hinge at a speed (rad/s), with a spring from a place (m) on the x axis of
+    the ground to its tip."""
+    twist = {"velocity": (0.0, 0.2 * speed, 0.0), "angular_velocity": (0.0, 0.0, speed)}
+    bar = Body(name="bar", mass=1.0, inertia=(0.001, 0.0133, 0.0133), position=(0.2, 0.0, 0.0), **twist)
+    pull = spring("ground", (place, 0.0, 0.0), "bar", (0.4, 0.0, 0.0), 20.0, natural_length, damping)
+    pin = hinge("A", "ground", "bar", (0.0, 0.0, 0.0))
+    return Scene(name="meeting", body=(bar,), duration=0.7, joint=(pin,), load=(pull,))
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
@@ -118,7 +102,7 @@ def test_spring_whose_ends_meet_pulls_back_as_the_bar_s_own_equation(beside, rto
     """Where the ends meet, or are apart by ``beside`` (m), the force changes its direction. The truth is the
     bar's equation of one degree of freedom, solved by SciPy with a stop where they meet. The change magnifies
     errors: 30 rtol are five times the largest error found (rad)."""
-    scene = sprung_bar(5.0, ((beside - 0.4, 0.0, 0.0), (0.4, 0.0, 0.0)), natural_length=0.3)
+    scene = sprung_bar(5.0, beside - 0.4, natural_length=0.3)
     run = simulate(scene, "taylor", [0.0, 0.7], Limits(rtol=rtol))
     assert run.outcome.name == "COMPLETED", run.message
     assert abs(run.joint("A").angle[-1] - angle_of_bar(beside, 0.7)) < 30.0 * rtol
@@ -130,7 +114,7 @@ def test_spring_whose_ends_meet_pulls_back_as_the_bar_s_own_equation(beside, rto
 def test_spring_without_natural_length_turns_a_bar_as_its_equation(place, damping):
     """From the ground at p to the bar's tip at a, p = ±a: J θ'' = -k a p sin θ - ½ c (a² + a p cos θ) θ',
     solved by SciPy."""
-    scene = sprung_bar(12.0, ((place, 0.0, 0.0), (0.4, 0.0, 0.0)), natural_length=0.0, damping=damping)
+    scene = sprung_bar(12.0, place, natural_length=0.0, damping=damping)
     run = simulate(scene, "taylor", [0.0, 0.7], Limits(rtol=1e-9))
     inertia, tip, stiffness = 0.0133 + 0.2**2, 0.4, 20.0
 

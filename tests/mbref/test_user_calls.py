@@ -62,6 +62,8 @@ def test_motion_is_saved_as_json_only(saved, tmp_path):
         ([-0.1, 0.1], "must be finite, not negative and increasing"),
         ([0.0, float("nan")], "must be finite, not negative and increasing"),
         (["soon"], "must be numbers"),
+        ([10**400], "must be numbers"),
+        ([[0.0], [1.0, 2.0]], "must be numbers"),
     ],
 )
 def test_times_of_simulate_that_are_no_samples_are_refused(times, says):

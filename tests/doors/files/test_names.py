@@ -149,7 +149,7 @@ def test_printed_commands_name_a_scene_file_in_any_folder_as_one_word(tmp_path, 
         assert str(path) in shlex.split(line), line
 
 
-@pytest.mark.parametrize("name", [*NAMES, "back\\slash", "\\u0041"])
+@pytest.mark.parametrize("name", [*NAMES, "back\\slash", "\\u0041", "[/nothing]", "%s {0}", "ground "])
 def test_scene_files_and_json_give_a_name_back(name, tmp_path, capsys):
     """Quotes and backslashes are escaped in TOML and in JSON."""
     named(name).save(tmp_path / "scene.toml")
