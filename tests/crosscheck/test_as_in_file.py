@@ -60,8 +60,7 @@ def setting_of(scene, family: str) -> Setting:
 
 
 def stepped_by_mujoco(model, start, times) -> np.ndarray:
-    """Return centres of mass (k, nb, 3) by MuJoCo's mj_step, whose last step before a sample is
-    shortened."""
+    """Return centres of mass (k, nb, 3) by MuJoCo's mj_step, with a shortened last step before samples."""
     for name in ("CONTACT", "LIMIT"):
         model.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
     data = mujoco.MjData(model)

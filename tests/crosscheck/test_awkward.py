@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance.mechanisms.awkward import AWKWARD, awkward
-from crosscheck.judge.arithmetic import EXTENDED, many_digits
+from crosscheck.judge.arithmetic import EXTENDED
 from crosscheck.judge.metrics import error_series
 from crosscheck.judge.reference.bound import differences
 from crosscheck.judge.reference.reference import judged, runs
@@ -12,6 +12,7 @@ from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from crosscheck.judge.truth import closed_form
 from crosscheck.judge.truth.reference_truth import trajectory
+from tests.crosscheck.measured import in_many_digits
 
 SECONDS = 200.0
 QUICK = ("rccc", "rounded_platform", "pushed_dead_centre")
@@ -32,37 +33,20 @@ def error_over_bound(kind: str, seed: int) -> float:
     if closed_form(scene):
         off = error_series(scene, trajectory(scene, found), closed_form(scene).poses(found.times))
     else:
-        off = differences(scene, motions[0], in_many_digits(scene, found.times))
+        off = differences(scene, motions[0], in_many_digits(scene, found.times, SECONDS))
     return float((off / found.bound).max())
 
 
-def in_many_digits(scene, times):
-    """Return the motion by formulation A in thirty digits, with other independent rows (seed 2)."""
-    pytest.importorskip("flint", reason="python-flint is the extra `certify`")
-    motion = natural_motion(scene, times, many_digits(30), order=34, tolerance=1e-24, seed=2, seconds=SECONDS)
-    assert not motion.reason
-    texts = [
-        x.str(30, radius=False) for array in (motion.position, motion.orientation) for x in array.ravel()
-    ]
-    numbers, size = np.array([EXTENDED.dtype(x) for x in texts]), motion.position.size
-    places, turns = numbers[:size], numbers[size:]
-    arrays = {
-        "position": places.reshape(motion.position.shape),
-        "orientation": turns.reshape(motion.orientation.shape),
-    }
-    return type(motion)(**vars(motion) | arrays)
+CASES = [
+    pytest.param(kind, seed, marks=[pytest.mark.slow] * (kind not in QUICK or seed > 0))
+    for kind in sorted(set(AWKWARD) - set(LARGE))
+    for seed in (0, 1, 2)
+]
 
 
-@pytest.mark.parametrize("kind", QUICK)
-def test_reference_of_an_awkward_mechanism_is_within_its_bound(kind):
+@pytest.mark.parametrize(("kind", "seed"), CASES)
+def test_reference_of_an_awkward_mechanism_is_within_its_bound(kind, seed):
     """`error_over_bound` compares it with a closed form, or with a run in thirty digits."""
-    assert error_over_bound(kind, 0) <= 1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 1, 2])
-@pytest.mark.parametrize("kind", sorted(set(AWKWARD) - set(LARGE)))
-def test_reference_of_every_awkward_mechanism_is_within_its_bound(kind, seed):
     assert error_over_bound(kind, seed) <= 1
 
 

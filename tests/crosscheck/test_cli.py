@@ -18,9 +18,10 @@ from crosscheck.study import grid
 from crosscheck.study.command import command
 from crosscheck.study.search.cheapest import by_error
 from crosscheck.study.search.execution import NOT_STARTED, CoarseFirst
-from mbref.scene import Body, Moment, Revolute, Scene, TorsionSpring
+from mbref.scene import Moment, Scene, TorsionSpring
 from mbref.scenes import SCENES
 from tests.helpers.fake_engines import FAKES
+from tests.helpers.statics import pendulum, rod
 
 FAKE = f"{FAKES}:FAKE"
 COMMANDS = ("list", "run", "compare", "tune", "verify", "report", "paper", "diff", "certify")
@@ -38,9 +39,9 @@ def still(tmp_path: Path) -> str:
 
 def saved(folder: Path, name: str, **changes: object) -> str:
     """Save a scene of one block at rest, as the fake engine leaves it: its error is zero."""
-    block = Body(name="block", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(1.0, 2.0, 3.0))
+    block = rod("block", (1.0, 2.0, 3.0), inertia=1.0)
     path = folder / f"{name}.toml"
-    Scene(name=name, body=(block,), duration=0.5, **changes).save(path)
+    Scene(**{"name": name, "body": (block,), "duration": 0.5, **changes}).save(path)
     return str(path)
 
 
@@ -75,13 +76,9 @@ def test_json_of_a_run_has_the_fields_of_a_record_and_the_engines_states(capsys,
 
 def two_blocks(folder: Path) -> str:
     """Save a scene of two bodies at rest, of which no closed form is known."""
-    path = folder / "two.toml"
-    bodies = [
-        Body(name=n, mass=2.0, inertia=(1.0, 1.0, 1.0), position=(1.0, y, 3.0))
-        for n, y in zip("ab", (0.0, 2.0), strict=True)
-    ]
-    Scene(name="two", body=tuple(bodies), duration=0.5).save(path)
-    return str(path)
+    return saved(
+        folder, "two", body=[rod(n, (1.0, y, 3.0), inertia=1.0) for n, y in (("a", 0.0), ("b", 2.0))]
+    )
 
 
 @pytest.fixture
@@ -132,20 +129,12 @@ def test_a_crashed_run_has_exit_status_one_and_names_the_signal(capsys, still):
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        (["--times", "0,0.2,0.1"], "--times: must increase, got 0.1 after 0.2"),
         (["--times=-1,0.2"], "--times: must be finite and not negative, got -1"),
         (["--times", "0"], "--times: must have a time after 0"),
-        (["--times", "0,nan"], "--times: must be finite and not negative, got nan"),
         (["--times", "0,1", "--duration", "0.5"], "--times: must end by --duration 0.5, got 1"),
         (["--option", "seconds=1", "--setting", "plain", "--setting", "noisy"], "needs one --engine and one"),
         (["--option", "seconds"], "must be name=value, got 'seconds'"),
         (["--times", "0,x"], "must be numbers separated by commas, got '0,x'"),
-        (["--samples", "1"], "--samples: must be a whole number from 2 to 1000000, got 1"),
-        (["--duration", "-2"], "--duration: must be positive and at most 1e+09 s, got -2"),
-        (["--duration", "inf"], "--duration: must be positive and at most 1e+09 s, got inf"),
-        (["--reference-time", "-1"], "--reference-time: must be from 0 to 1e+07 s, got -1"),
-        (["--rtol", "0"], "--rtol: must be positive and at most 0.99, got 0"),
-        (["--time-limit", "0"], "--time-limit: must be positive and at most 1e+07 s, got 0"),
         (["--setting", "gentle"], "unknown method or setting 'gentle'; known: 'plain', 'noisy'"),
         (["--setting", "noisi"], "did you mean 'noisy'?"),
         (["--engine", "mujco"], "did you mean 'mujoco'?"),
@@ -428,21 +417,15 @@ def test_compare_gives_no_ratios_of_times_if_engines_differ_and_no_truth_is_know
     asked = (*WITH_ELSEWHERE, "--reference-time", "0")
     status, out, err = run_main(capsys, "compare", two_blocks(tmp_path), *asked)
     assert status == 1, err
-    assert "two: the engines simulate different mechanisms, so times are not compared: initial pos" in err, (
-        err
-    )
+    assert "two: the engines simulate different mechanisms, so times are not compared: initial" in err, err
     assert "the engines simulate different mechanisms: initial position" in " ".join(out.split()), out
     assert " ratio" not in out, "times of different mechanisms were compared"
 
 
 def test_compare_does_not_judge_an_adapter_that_loses_a_spring(capsys, tmp_path):
     """The torsion spring is slack at the start, so that only later accelerations differ."""
-    block = Body(name="rod", mass=2.0, inertia=(1e-3, 0.1, 0.1), position=(0.5, 0.0, 0.0))
-    hinge = Revolute(name="A", bodies=("ground", "rod"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
     later = TorsionSpring(joint="A", stiffness=30.0, damping=0.0, natural_angle=0.0)
-    Scene(
-        name="later", body=(block,), joint=(hinge,), load=(later,), gravity=(0.0, -9.81, 0.0), duration=0.5
-    ).save(tmp_path / "later.toml")
+    pendulum((0.5, 0.0, 0.0), load=(later,), duration=0.5).save(tmp_path / "later.toml")
     asked = ("--engine", "pinocchio", "--engine", f"{FAKES}:LOSES_LOADS", "--setting", "tuned")
     status, out, err = run_main(capsys, "compare", str(tmp_path / "later.toml"), *asked)
     assert status == 1, (out, err)
@@ -452,8 +435,7 @@ def test_compare_does_not_judge_an_adapter_that_loses_a_spring(capsys, tmp_path)
 
 
 def test_compare_tries_every_family_before_it_says_that_an_engine_completes_no_run(capsys, still):
-    """The engine has four families, and only the fourth completes; asked for the first alone, it completes
-    none."""
+    """Of the engine's four families only the fourth completes; the first alone completes none."""
     status, out, _ = run_main(capsys, "compare", still, "--engine", f"{FAKES}:LAST_ONE_RUNS")
     assert status == 0 and "last is right at its best settings" in out and "fourth" in out, out
     asked = ("--engine", f"{FAKES}:LAST_ONE_RUNS", "--setting", "first")

@@ -112,8 +112,7 @@ def test_dop853_solves_an_oscillator_within_twenty_tolerances(rtol: float) -> No
 
 
 def test_error_of_equally_many_steps_falls_with_the_ninth_power_of_their_length() -> None:
-    """A method of order 8 has a local error of order h⁹; at a huge tolerance the number of steps is
-    fixed."""
+    """A method of order 8 has a local error of order h⁹; a huge tolerance fixes the number of steps."""
     errors, counts = [], []
     for h in (0.8, 0.4):
         memory = integrate(oscillator, [1.0, 0.0], [h], 1e9)[3]
@@ -204,8 +203,7 @@ def test_mujocos_compiled_family_gives_the_true_motion(name: str) -> None:
 
 
 def completed_by_both(family: str, in_python: str, beta: float) -> tuple[Scene, Trajectory, Trajectory]:
-    """Return a scene with every joint and load, and completed runs of MuJoCo by a compiled family and by one
-    in Python."""
+    """Return a scene with every joint and load, and runs of MuJoCo by a compiled family and one in Python."""
     scene = every_joint().with_(duration=0.2)
     options = {"rtol": 1e-9, "min_step": 1e-9, "beta": beta, "hard": 1e-7}
     compiled, plain = (simulate("mujoco", scene, 6, each, **options) for each in (family, in_python))
@@ -317,8 +315,7 @@ def out_of_reach() -> Scene:
 
 
 def test_planar_scene_leaves_a_mechanism_that_can_leave_its_plane_unchanged() -> None:
-    """A double pendulum on a hinge and a ball joint, at rest and with a spin out of the plane of the
-    hinges."""
+    """A double pendulum on a hinge and a ball joint, at rest and with a spin out of the hinges' plane."""
     scene = SCENES["four_bar_gravity"]()
     hinge, second = scene.joint[:2]
     ball = Spherical(name=second.name, bodies=second.bodies, anchor=second.anchor)

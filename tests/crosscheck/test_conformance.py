@@ -28,8 +28,7 @@ SPECIMENS = {specimen.scene.name: specimen for specimen in specimens()}
 
 
 def test_formulas_of_the_suite_equal_the_judges_truth():
-    """The suite has a formula of each motion; the judge, whose code is its own, solves an equation of
-    motion."""
+    """The suite has a formula of each motion; the judge, by its own code, solves an equation of motion."""
     for name in ("free_fall", "oscillator", "torsion", "driven", "pendulum", "turntable"):
         specimen = SPECIMENS[name]
         solved, times = truth_for(specimen.scene), np.linspace(0, specimen.scene.duration, 7)
@@ -40,8 +39,7 @@ def test_formulas_of_the_suite_equal_the_judges_truth():
 
 @pytest.mark.parametrize("make", GEARED, ids=lambda make: make.__name__)
 def test_formulas_of_geared_mechanisms_equal_the_reference(make):
-    """The judge's reference integrates the equations of motion in long doubles; signs of quaternions are
-    free."""
+    """The judge's reference integrates equations of motion in long doubles; signs of quaternions are free."""
     scene, exact = make()
     times = np.linspace(0, scene.duration, 4)
     position, orientation = exact(times)

@@ -83,8 +83,7 @@ def test_computation_of_a_certified_table_ends_at_its_limit_of_cpu_time():
 
 
 def test_the_nearer_of_two_nested_limits_counts():
-    """A limit of -1 s has passed already, outside and inside a limit of 100 s; afterwards it is
-    forgotten."""
+    """A limit of -1 s has passed already, outside and inside a limit of 100 s; then it is forgotten."""
     with within(100.0):
         with within(-1.0), pytest.raises(TimeIsUp):
             ask()

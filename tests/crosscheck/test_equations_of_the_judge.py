@@ -153,19 +153,10 @@ def test_turns_are_unknown_where_rates_near_a_step_differ_by_half_a_turn(rate, k
 
 
 # --- loads ------------------------------------------------------------------------------------------------
-def at_state(
-    scene: Scene, *, turn=UNIT, place=None, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0), angles=()
-):
-    """Return r, q, v, ω and the turned angles of loads: all bodies with one orientation and one velocity."""
-    places = [b.position for b in scene.body] if place is None else [place]
-    count = len(scene.body)
-    return (
-        np.array(places, dtype=float),
-        np.tile(turn, (count, 1)),
-        np.tile(velocity, (count, 1)).astype(float),
-        np.tile(spin, (count, 1)).astype(float),
-        np.array(angles, dtype=float),
-    )
+def at_rest(scene: Scene):
+    """Return r, q, v, ω and the turned angles of loads: none moves or is turned, and no load has an angle."""
+    places = np.array([b.position for b in scene.body])
+    return places, np.tile(UNIT, (len(places), 1)), 0 * places, 0 * places, np.zeros(0)
 
 
 def hinged(load) -> Scene:
@@ -291,11 +282,12 @@ def test_a_massless_link_does_not_change_the_acceleration_of_a_pendulum():
     """A pendulum of 2 kg and 0.5 kg m² at 1 m falls with 18 / 2.5 = 7.2 rad/s², alone and welded to a
     massless link that is hinged to the ground."""
     scene = pendulum().with_(load=())
-    state = at_state(scene)
-    assert accelerations(scene, 0.0, state)[0] == pytest.approx([0.0, -7.2, 0.0, 0.0, 0.0, -7.2], abs=1e-12)
+    assert accelerations(scene, 0.0, at_rest(scene))[0] == pytest.approx(
+        [0.0, -7.2, 0.0, 0.0, 0.0, -7.2], abs=1e-12
+    )
     link = body("link", mass=0.0, inertia=(0.0, 0.0, 0.0), position=(0.0, 0.0, 0.0))
     weld = Fixed(name="W", bodies=("link", "b"), anchor=(0.5, 0.0, 0.0))
     pivot = Revolute(name="P", bodies=("ground", "link"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
     longer = scene.with_(body=(link, scene.body[0]), joint=(pivot, weld))
-    found = accelerations(longer, 0.0, at_state(longer))
+    found = accelerations(longer, 0.0, at_rest(longer))
     assert found[1] == pytest.approx([0.0, -7.2, 0.0, 0.0, 0.0, -7.2], abs=1e-12)

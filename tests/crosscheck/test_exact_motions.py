@@ -30,8 +30,7 @@ def test_gausss_principle_gives_the_true_motion(name):
 
 
 def test_gausss_principle_turns_a_free_asymmetric_top_by_jacobis_elliptic_functions():
-    """Euler's solution of the angular velocity about body axes: cn, sn and dn (Landau and Lifshitz, §
-    37)."""
+    """Euler's solution of the angular velocity about body axes: cn, sn and dn (Landau, Lifshitz, § 37)."""
     moments, spin = np.array([0.02, 0.03, 0.045]), np.array([4.0, 0.0, 5.0])
     at_rest = {"position": (0.0, 0.0, 0.0), "velocity": (0.0, 0.0, 0.0)}
     body = Body(name="top", mass=1.0, inertia=moments, angular_velocity=spin, **at_rest)

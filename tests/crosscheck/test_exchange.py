@@ -44,9 +44,10 @@ def held_acceleration(model, data) -> np.ndarray:
     return free - inverse @ np.linalg.pinv(jacobian @ inverse, rcond=1e-9) @ (jacobian @ free)
 
 
-def acceleration_difference(scene: Scene, model) -> float:
+def acceleration_difference(scene: Scene, path: Path) -> float:
     """Return the largest difference of accelerations of centres of mass at rest at qpos0, by mbref and by
-    MuJoCo's matrices, over the largest acceleration, which is above 0.1 m/s²."""
+    MuJoCo's matrices of the file, over the largest acceleration, which is above 0.1 m/s²."""
+    model = mujoco.MjModel.from_xml_path(str(path))
     start = simulate(scene, "mpi-svd+projection", [0.0])
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -81,21 +82,16 @@ def in_frames_of(scene: Scene, trajectory: Trajectory, own: Scene) -> Trajectory
 
 
 def difference(scene: Scene, again: Scene) -> Difference | None:
-    """Return the difference of poses and changes of velocity of two scenes by the judge's check of
-    models."""
+    """Return the difference of poses and changes of velocity of two scenes by the judge's check."""
     runs = [simulate(s, "mpi-svd+projection", gate_times(scene)) for s in (scene, again)]
     return gate(scene, [runs[0], in_frames_of(scene, runs[1], again)])
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_scene_of_an_mjcf_file_accelerates_as_mujocos_matrices_say(name):
-    """Accelerations at rest, by mbref from the scene and by the equations of MuJoCo's own model of the
-    file."""
-    scene = formats.read(MODELS / f"{name}.xml").scene
-    assert (
-        acceleration_difference(scene, mujoco.MjModel.from_xml_path(str(MODELS / f"{name}.xml")))
-        < MARGIN * ALIKE
-    )
+    """Accelerations at rest, by mbref from the scene and by the equations of MuJoCo's own model."""
+    path = MODELS / f"{name}.xml"
+    assert acceleration_difference(formats.read(path).scene, path) < MARGIN * ALIKE
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "slider_crank"])
@@ -118,8 +114,7 @@ def test_piston_of_a_cut_slide_is_read_in_two_parts_with_its_mass_after_a_round_
     assert found.keys() == {"crank", "rod", "pin", "piston (share 4)"}
     both = mass["pin"] + mass["piston"]
     assert found["pin"] + found["piston (share 4)"] == pytest.approx(both, rel=ALIKE)
-    model = mujoco.MjModel.from_xml_path(str(tmp_path / "again.xml"))
-    assert acceleration_difference(again.scene, model) < MARGIN * ALIKE
+    assert acceleration_difference(again.scene, tmp_path / "again.xml") < MARGIN * ALIKE
 
 
 @pytest.mark.parametrize("name", EXPORTED)
@@ -131,10 +126,7 @@ def test_an_exported_scene_accelerates_in_mujoco_and_moves_when_read_again_as_th
     bodies = [b.model_copy(update={"velocity": None, "angular_velocity": None}) for b in scene.body]
     scene = scene.with_(driver=(), load=loads, body=bodies, gravity=(0.5, -9.0, 3.0))
     formats.write(scene, tmp_path / "scene.xml")
-    assert (
-        acceleration_difference(scene, mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml")))
-        < MARGIN * ALIKE
-    )
+    assert acceleration_difference(scene, tmp_path / "scene.xml") < MARGIN * ALIKE
     assert difference(scene, formats.read(tmp_path / "scene.xml").scene) is None
 
 

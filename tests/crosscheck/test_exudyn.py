@@ -12,14 +12,13 @@ from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory
-from mbref.scene import Body, Cylindrical, Driver, Revolute, Scene, TorsionSpring
+from mbref.scene import Cylindrical, Driver, Revolute, Scene, TorsionSpring
 from mbref.scenes import SCENES
 from tests.crosscheck.measured import MARGIN, ROUNDING
-from tests.crosscheck.tree_scenes import driven, every_joint
+from tests.crosscheck.tree_scenes import INERTIA, body, driven, every_joint
 
 SIDEWAYS = (0.6, 0.0, 0.8)  # an axis along no coordinate axis
-INERTIA = ((0.02, 0.002, -0.001), (0.002, 0.03, 0.003), (-0.001, 0.003, 0.025))
-TURNED = tuple(rotations.from_vector([0.3, -0.5, 0.8]).tolist())
+TURNED = (0.3, -0.5, 0.8)  # rotation vector, rad
 # measured errors
 ACCELERATION = 2.7e-8  # of accelerations / the largest acceleration
 TURNING = 8.2e-10  # rad, of a body on a hinge
@@ -37,8 +36,8 @@ def run(scene: Scene, times: np.ndarray, family: str, step: float) -> Trajectory
 
 def one_body(**changes: object) -> Scene:
     """Return a body with a full inertia matrix, 0.2 m from a joint at the origin whose axis is SIDEWAYS."""
-    body = Body(name="b", mass=2.0, inertia=INERTIA, position=(0.0, 0.2, 0.0), orientation=TURNED)
-    return Scene(name="one", body=(body,), duration=1.0, **changes)
+    held = body("b", (0.0, 0.2, 0.0), TURNED, mass=2.0)
+    return Scene(name="one", body=(held,), duration=1.0, **changes)
 
 
 def hinge(kind: type = Revolute, bodies: tuple[str, str] = ("ground", "b")) -> dict[str, object]:
@@ -46,9 +45,8 @@ def hinge(kind: type = Revolute, bodies: tuple[str, str] = ("ground", "b")) -> d
 
 
 def moment_of_inertia(scene: Scene) -> float:
-    """Return the moment of inertia (kg m²) about SIDEWAYS through the origin, at a right angle to the
-    arm."""
-    turn = rotations.to_matrix(np.array(TURNED))
+    """Return the moment of inertia (kg m²) about SIDEWAYS through the origin, across the arm."""
+    turn = rotations.to_matrix(np.array(scene.body[0].orientation))
     axis = np.array(SIDEWAYS)
     return float(axis @ turn @ np.array(INERTIA) @ turn.T @ axis) + scene.body[0].mass * 0.2**2
 
@@ -138,8 +136,7 @@ def test_exudyn_swings_a_body_on_a_torsion_spring_beyond_a_turn(kind: type, bodi
 
 
 def test_exudyn_keeps_joints_of_every_kind_closed():
-    """Residuals of the judge's joint equations and their rates (OPEN), in a scene with and without
-    drivers."""
+    """Residuals of the judge's joint equations and their rates (OPEN), with and without drivers."""
     for scene in (every_joint(), driven()):
         measured = measure(scene, run(scene, np.linspace(0, 0.2, 6), "tuned", 2.5e-3))
         assert measured["violation_position"] < MARGIN * OPEN[0], (scene.name, measured)
@@ -147,12 +144,10 @@ def test_exudyn_keeps_joints_of_every_kind_closed():
 
 
 def test_exudyn_tumbles_a_torque_free_body_as_the_truth():
-    """The judge knows the motion of a body under gravity alone; MARGIN times the measured error is
-    allowed."""
-    pose = {"position": (1.0, 2.0, 3.0), "orientation": TURNED}
+    """The judge knows the motion under gravity alone; MARGIN times the measured error is allowed."""
     twist = {"velocity": (1.0, 0.0, -0.5), "angular_velocity": (3.0, 8.0, -2.0)}
-    body = Body(name="top", mass=2.0, inertia=INERTIA, **pose, **twist)
-    scene = Scene(name="top", body=(body,), gravity=(0.0, -9.81, 0.0), duration=1.0)
+    top = body("top", (1.0, 2.0, 3.0), TURNED, mass=2.0, **twist)
+    scene = Scene(name="top", body=(top,), gravity=(0.0, -9.81, 0.0), duration=1.0)
     measured = measure(scene, run(scene, np.linspace(0, 1, 6), "tuned", 2e-3), truth_for(scene))
     assert measured["error"] < MARGIN * TUMBLING, measured
 

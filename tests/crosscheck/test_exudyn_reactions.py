@@ -7,55 +7,40 @@ from crosscheck.engine import Setting
 from crosscheck.engines.exudyn.adapter import ENGINE
 from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory
-from mbref.scene import JOINT_TYPES, Body, Driver, Moment, Revolute, Scene, Sine
+from mbref.scene import JOINT_TYPES, Driver, Moment, Revolute, Scene, Sine
 from tests.crosscheck.measured import MARGIN
+from tests.crosscheck.tree_scenes import INERTIA, body
+from tests.helpers.parts import X
 
 MEASURED = 1.6e-10  # measured difference / largest force or moment
 SIDEWAYS = (0.6, 0.0, 0.8)  # an axis along no coordinate axis
-INERTIA = ((0.02, 0.002, -0.001), (0.002, 0.03, 0.003), (-0.001, 0.003, 0.025))
-BODY = Body(
-    name="b",
-    mass=2.0,
-    inertia=INERTIA,
-    position=(0.0, 0.2, 0.0),
-    orientation=tuple(rotations.from_vector([0.3, -0.5, 0.8]).tolist()),
-)
+BODY = body("b", (0.0, 0.2, 0.0), (0.3, -0.5, 0.8), mass=2.0)
 ANCHOR, OTHER = (0.1, 0.1, -0.2), (0.3, -0.1, 0.1)
-PLACES = {
-    "anchor": ANCHOR,
-    "anchors": (ANCHOR, OTHER),
-    "axis": SIDEWAYS,
-    "axes": ((1.0, 0.0, 0.0), (0.0, 1.0, 1.0)),
-}
+PLACES = {"anchor": ANCHOR, "anchors": (ANCHOR, OTHER), "axis": SIDEWAYS, "axes": (X, (0.0, 1.0, 1.0))}
+UNDRIVEN = [(name, False) for name in JOINT_TYPES]
+DRIVEN = [(name, True) for name, kind in JOINT_TYPES.items() if kind.facts.driven]
 
 
 def needed_wrench(scene: Scene, trajectory: Trajectory) -> np.ndarray:
     """Return force and moment (k, 6) about the anchor on the second body by the run's accelerations."""
-    body, joint = scene.body[0], scene.joint[0]
+    held, joint = scene.body[0], scene.joint[0]
     turn = rotations.to_matrix(trajectory.orientation[:, 0])
     inertia = turn @ np.array(INERTIA) @ np.swapaxes(turn, 1, 2)
     w, alpha = trajectory.angular_velocity[:, 0], trajectory.angular_acceleration[:, 0]
-    force = body.mass * (trajectory.acceleration[:, 0] - np.array(scene.gravity))
+    force = held.mass * (trajectory.acceleration[:, 0] - np.array(scene.gravity))
     spin = np.einsum("kij,kj->ki", inertia, w)
     moment = np.einsum("kij,kj->ki", inertia, alpha) + np.cross(w, spin) - np.array(scene.load[0].moment)
     anchors = joint.anchor_pair
     point = np.array(anchors[1])
     if joint.bodies[1] == "b":
-        start = rotations.to_matrix(np.array(body.orientation))
-        point = trajectory.position[:, 0] + turn @ start.T @ (point - np.array(body.position))
+        start = rotations.to_matrix(np.array(held.orientation))
+        point = trajectory.position[:, 0] + turn @ start.T @ (point - np.array(held.position))
     moment = moment - np.cross(point - trajectory.position[:, 0], force)
     return np.concatenate([force, moment], axis=1) * (1 if joint.bodies[1] == "b" else -1)
 
 
 @pytest.mark.parametrize("bodies", [("ground", "b"), ("b", "ground")])
-@pytest.mark.parametrize(
-    ("kind", "driven"),
-    [
-        (name, driven)
-        for name, kind in JOINT_TYPES.items()
-        for driven in (False, True)[: 1 + bool(kind.facts.driven)]
-    ],
-)
+@pytest.mark.parametrize(("kind", "driven"), [*UNDRIVEN, *DRIVEN])
 def test_exudyns_reaction_causes_the_acceleration_of_the_body(
     kind: str, driven: bool, bodies: tuple[str, str]
 ):

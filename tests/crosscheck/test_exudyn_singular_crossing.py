@@ -31,8 +31,7 @@ SINGULAR = 0.061192068340  # s, where the equal slider-crank's crank has turned 
 def test_exudyn_moves_through_singular_positions_within_its_measured_errors(
     name: str, duration: float, step: float, errors: tuple[float, float]
 ):
-    """Poses by the judge's truth, and rates of joints by its joint equations; at most MARGIN times
-    measured."""
+    """Poses by the judge's truth, rates of joints by its equations; at most MARGIN times measured."""
     scene = SCENES[name]()
     run = ENGINE.run(scene, np.linspace(0, duration, 14), Setting("tuned", {"step": step}))
     assert run.outcome is Outcome.COMPLETED, run.message
@@ -42,8 +41,7 @@ def test_exudyn_moves_through_singular_positions_within_its_measured_errors(
 
 
 def test_exudyns_samples_at_and_next_to_a_singular_position_are_true():
-    """The slider-crank with equal links has a closed form; 2.8e-12 (of its length, or rad) is the measured
-    error."""
+    """The slider-crank with equal links has a closed form; 2.8e-12 (of its length, or rad) is measured."""
     scene = SCENES["planar_slider_crank_equal"]()
     times = np.array([0.03, SINGULAR - 5e-5, SINGULAR, SINGULAR + 5e-5, 0.08])
     run = ENGINE.run(scene, times, Setting("tuned", {"step": 1e-4}))

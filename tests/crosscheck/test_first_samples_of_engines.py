@@ -9,16 +9,14 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Engine, Setting, engine, installed
-from crosscheck.judge.constraints import initial_poses, initial_twists, scene_length
-from crosscheck.judge.gauss_principle import gauss
 from crosscheck.judge.joint_reactions import compare
 from crosscheck.judge.metrics import in_scene_order
-from crosscheck.judge.reaction_balance import with_exact_reactions
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Joint, JointForce, JointTorque, Scene, SlideSpring, Spring, TorsionSpring
 from mbref.scenes import SCENES as SHIPPED
 from tests.crosscheck.driven_arm import driven_arm
 from tests.crosscheck.tree_scenes import body, driven, every_joint, ring
+from tests.helpers.exact_motions import exact_start
 from tests.helpers.parts import hinge, joint, slide
 
 WAYS = {  # engine: a setting, and the largest relative difference of its accelerations and reactions
@@ -120,23 +118,6 @@ SCENES = {
 }
 
 
-@functools.cache
-def exact(name: str) -> Trajectory:
-    """Return the start of a scene with accelerations by Gauss's principle, and reactions by balances."""
-    scene = SCENES[name]
-    (position, orientation), (velocity, spin) = initial_poses(scene), initial_twists(scene)
-    both = gauss(scene)
-    count = len(scene.body)
-    states = position, orientation, velocity, spin, both[:count], both[count:] / scene_length(scene)
-    position, orientation, velocity, spin, linear, angular = (np.array(state)[None] for state in states)
-    bodies = tuple(body.name for body in scene.body)
-    start = Trajectory(
-        name, "judge", "", "", {}, TIMES[:1], bodies, position, orientation, velocity, spin,
-        acceleration=linear, angular_acceleration=angular,
-    )  # fmt: skip
-    return with_exact_reactions(scene, start)
-
-
 def able(name: str, scene: Scene) -> Engine:
     if not installed(name):
         pytest.skip(f"{name} is not installed")
@@ -155,9 +136,8 @@ def short_run(way: str, name: str) -> Trajectory:
 
 
 def largest_difference(run: Trajectory, name: str, fields: list[str]) -> float:
-    """Return the largest difference of the first sample from `exact`, over the largest value and at least
-    1."""
-    pairs = [(getattr(run, field)[0], getattr(exact(name), field)[0]) for field in fields]
+    """Return the largest difference of the first sample from `exact_start`, over the largest value or 1."""
+    pairs = [(getattr(run, field)[0], getattr(exact_start(SCENES[name]), field)[0]) for field in fields]
     return max(float(abs(found - true).max() / max(1.0, abs(true).max())) for found, true in pairs)
 
 
@@ -178,11 +158,10 @@ def test_first_sample_of_an_engine_has_the_accelerations_of_gausss_principle(way
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("way", WAYS)
 def test_first_sample_of_an_engine_has_the_reactions_that_balance_every_body(way: str, name: str) -> None:
-    """Where redundant rows leave components of reactions undetermined, only their sums on bodies are
-    compared."""
+    """Where redundant rows leave components of reactions open, only their sums on bodies are compared."""
     if way == "exudyn" and SCENES[name].driver:
         pytest.skip("Exudyn gives neither accelerations nor reactions of a driven scene")
-    compared = compare(SCENES[name], exact(name), first(short_run(way, name)))
+    compared = compare(SCENES[name], exact_start(SCENES[name]), first(short_run(way, name)))
     off = {joint: reaction.unique for joint, reaction in compared.joints.items()}
     assert max(off.values()) < WAYS[way][1] and compared.resultant < WAYS[way][1], (off, compared.resultant)
 

@@ -124,8 +124,7 @@ def test_casadi_refuses_scenes_if_no_c_compiler_is_installed(monkeypatch: pytest
 def test_a_file_in_the_cache_is_found_by_its_origin_unless_it_is_damaged(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The origin is the text from which a file was made; a damaged file has another checksum than was
-    stored."""
+    """The origin is the text from which a file was made; a damaged file has another checksum than stored."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert file_cache.stored("folder", "origin", ".txt") is None
     path = file_cache.store("folder", "origin", ".txt", lambda target: target.write_text("whole"))

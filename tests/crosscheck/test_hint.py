@@ -68,8 +68,7 @@ def runner_with(defect, monkeypatch):
     ],
 )
 def test_hint_names_the_term_of_the_equations_that_is_wrong(defect, names, says, monkeypatch):
-    """The engine solves the equations of `Defective` with one defect, and fails the check `truth` of
-    ``names``."""
+    """The engine solves the equations of `Defective` with one defect; it fails `truth` of ``names``."""
     runner = runner_with(defect, monkeypatch)
     found = hint(runner, [Failure(KNOWN[name], "truth") for name in names])
     assert says in found, found

@@ -169,6 +169,8 @@ MOTORS = """<mujoco><option timestep="0.001" integrator="RK4"/><worldbody>
 <general name="p" joint="slide" gainprm="3" gear="-2" ctrllimited="true" ctrlrange="-1 1"/>
 SERVO</actuator><keyframe><key name="on" ctrl="0.05 4SERVED"/></keyframe></mujoco>"""
 
+PLAIN = MOTORS.replace("SERVO", "").replace("SERVED", "")
+
 
 def read(tmp_path: Path, text: str, **options: object):
     (tmp_path / "model.xml").write_text(text)
@@ -178,12 +180,11 @@ def read(tmp_path: Path, text: str, **options: object):
 def test_slide_springs_and_keyframe_motors_are_imported_as_loads(tmp_path):
     """Torque = gear 20 · ctrl 0.05 = 1 N m. Force = gain 3 · gear -2 · ctrl 4, clipped to 1, = -6 N.
     The scene moves as MuJoCo's RK4 with 500 steps of 1 ms moves the model, to 1e-9 m."""
-    plain = MOTORS.replace("SERVO", "").replace("SERVED", "")
-    scene = read(tmp_path, plain, keyframe="on").scene
+    scene = read(tmp_path, PLAIN, keyframe="on").scene
     found = {load.type: load for load in scene.load}
     assert found["slide_spring"].natural_displacement == 0.05 and found["slide_spring"].damping == 0.7
     assert found["joint_torque"].torque == pytest.approx(1.0) and found["joint_force"].force == -6.0
-    model = mujoco.MjModel.from_xml_string(plain)
+    model = mujoco.MjModel.from_xml_string(PLAIN)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_step(model, data, 500)
@@ -194,8 +195,7 @@ def test_slide_springs_and_keyframe_motors_are_imported_as_loads(tmp_path):
 
 def test_motors_without_a_keyframe_are_no_loads(tmp_path):
     """The scene has the spring and the damper of the joints, and no other load of the file."""
-    plain = MOTORS.replace("SERVO", "").replace("SERVED", "")
-    loads = read(tmp_path, plain).scene.load
+    loads = read(tmp_path, PLAIN).scene.load
     assert sorted(load.type for load in loads) == ["slide_spring", "torsion_spring"]
 
 
@@ -206,15 +206,12 @@ def test_servo_with_a_force_range_is_refused_by_name_or_left_out(tmp_path):
     with pytest.raises(SceneError, match=r"'s', whose range of forces.*--without motors"):
         read(tmp_path, text, keyframe="on")
     left = read(tmp_path, text, keyframe="on", without=("motors",)).scene
-    plain = MOTORS.replace("SERVO", "").replace("SERVED", "")
-    assert left.load == read(tmp_path, plain, keyframe="on").scene.load
+    assert left.load == read(tmp_path, PLAIN, keyframe="on").scene.load
 
 
 def test_joint_loads_return_from_exported_mjcf_with_their_motion(tmp_path):
-    """Motors are written with keyframe "loads", which the notes say. Both scenes move alike by the
-    reference."""
-    plain = MOTORS.replace("SERVO", "").replace("SERVED", "")
-    scene = read(tmp_path, plain, keyframe="on").scene
+    """Motors are written with keyframe "loads", which the notes say. Both move alike by the reference."""
+    scene = read(tmp_path, PLAIN, keyframe="on").scene
     exported = FORMAT.write(scene)
     assert "its motor is controlled in keyframe 'loads'" in " ".join(exported.left_out)
     again = read(tmp_path, exported.text, keyframe="loads").scene
@@ -226,6 +223,5 @@ def test_joint_loads_return_from_exported_mjcf_with_their_motion(tmp_path):
 
 def test_load_over_time_is_left_out_of_exported_mjcf_with_a_note(tmp_path):
     """A motor's load is switched on at 0.2 s."""
-    plain = MOTORS.replace("SERVO", "").replace("SERVED", "")
-    timed = read(tmp_path, plain, keyframe="on").scene.with_("load[2].factor", Factor(start=0.2))
+    timed = read(tmp_path, PLAIN, keyframe="on").scene.with_("load[2].factor", Factor(start=0.2))
     assert "MJCF has no loads over time" in " ".join(FORMAT.write(timed).left_out)

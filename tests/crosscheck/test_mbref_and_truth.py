@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from crosscheck.judge.metrics import measure
-from crosscheck.judge.truth import truth_for
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
-from tests.crosscheck.measured import MARGIN, ROUNDING
+from tests.crosscheck.measured import MARGIN, ROUNDING, relative_error
 
 RUNS = [  # scene, end time (s), method, rtol, measured error
     ("planar_slider_crank", 0.4, "mpi-svd+projection", 1e-11, 1.3e-10),
@@ -40,32 +39,28 @@ CROSSINGS = {  # scene: end time (s), beyond singular positions, and the measure
 }
 
 
-def judged(name, end, method, rtol):
-    scene = SCENES[name]()
-    trajectory = simulate(scene, method, np.linspace(0.0, end, 6), Limits(rtol=rtol))
-    assert trajectory.outcome.name == "COMPLETED", f"{name}, {method}: {trajectory.message}"
-    return measure(scene, trajectory, truth_for(scene))
+ACROSS = [
+    (name, end, "taylor", rtol, error)
+    for name, (end, errors) in CROSSINGS.items()
+    for rtol, error in zip(RTOLS, errors, strict=True)
+]
 
 
-@pytest.mark.parametrize(("name", "end", "method", "rtol", "measured"), RUNS)
+def run_of(scene, end, method, rtol):
+    return simulate(scene, method, np.linspace(0.0, end, 6), Limits(rtol=rtol))
+
+
+@pytest.mark.parametrize(("name", "end", "method", "rtol", "measured"), [*RUNS, *ACROSS])
 def test_method_stays_within_its_measured_error_of_the_truth(name, end, method, rtol, measured):
-    """RUNS has the measured errors (of the length, or rad); 10 times as much is allowed."""
-    error = judged(name, end, method, rtol)["error"]
+    """RUNS has the measured errors (of the length, or rad), CROSSINGS those of the series method behind
+    singular positions; 10 times as much is allowed."""
+    error = relative_error(run_of(SCENES[name](), end, method, rtol), SCENES[name]())
     assert error < MARGIN * measured, f"{name}, {method}: error {error:.2e}, measured {measured:.1e}"
-
-
-@pytest.mark.parametrize("name", CROSSINGS)
-@pytest.mark.parametrize("rtol", RTOLS)
-def test_taylor_crosses_singular_positions_within_its_measured_error(name, rtol):
-    """CROSSINGS has end times behind singular positions and measured errors; 10 times as much is allowed."""
-    end, errors = CROSSINGS[name]
-    measured = errors[RTOLS.index(rtol)]
-    error = judged(name, end, "taylor", rtol)["error"]
-    assert error < MARGIN * measured, f"{name}, rtol {rtol:g}: error {error:.2e}, measured {measured:.1e}"
 
 
 def test_partitioning_keeps_the_constraints_at_a_loose_tolerance():
     """At rtol 1e-5 the error is above 1e-9; the violation, which Newton's method removes in each step, is
     below 1e-12. Both over the scene's length."""
-    measured = judged("spatial_slider_crank", 0.02, "lm1+partitioning", 1e-5)
-    assert measured["violation_position"] < 1e-12 and measured["error"] > 1e-9, measured
+    scene = SCENES["spatial_slider_crank"]()
+    run = run_of(scene, 0.02, "lm1+partitioning", 1e-5)
+    assert relative_error(run, scene) > 1e-9 and measure(scene, run)["violation_position"] < 1e-12

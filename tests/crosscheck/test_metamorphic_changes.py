@@ -11,16 +11,14 @@ import pytest
 import mbref
 from crosscheck.conformance.changes.copies import Outside
 from crosscheck.conformance.changes.relations import RELATIONS
-from crosscheck.judge.constraints import initial_poses, initial_twists, scene_length
-from crosscheck.judge.gauss_principle import gauss
 from crosscheck.judge.joint_reactions import resultants
-from crosscheck.judge.reaction_balance import with_exact_reactions
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 from tests.crosscheck.driven_arm import TURN, driven_arm
 from tests.crosscheck.test_first_samples_of_engines import loaded
 from tests.crosscheck.tree_scenes import driven, every_joint, ring
+from tests.helpers.exact_motions import exact_start
 
 # relations that change the joints, or the shares of joints in the load on a body
 OTHER_REACTIONS = ("duplicated", "satisfied", "split", "replayed", "relabelled")
@@ -31,40 +29,15 @@ SOLVED = 1e-11  # of the largest value, or rad: 10 times the measured difference
 FIELDS = ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
 
 
-def start(scene: Scene) -> Trajectory:
-    """The start of a scene with its accelerations and reactions."""
-    (position, orientation), (velocity, spin) = initial_poses(scene), initial_twists(scene)
-    both, count = gauss(scene), len(scene.body)
-    states = position, orientation, velocity, spin, both[:count], both[count:] / scene_length(scene)
-    position, orientation, velocity, spin, linear, angular = (np.array(state)[None] for state in states)
-    names = tuple(body.name for body in scene.body)
-    made = Trajectory(
-        scene.name,
-        "judge",
-        "",
-        "",
-        {},
-        np.zeros(1),
-        names,
-        position,
-        orientation,
-        velocity,
-        spin,
-        acceleration=linear,
-        angular_acceleration=angular,
-    )
-    return with_exact_reactions(scene, made)
-
-
 @functools.cache
 def starts(relation: str, name: str) -> tuple[Scene, Trajectory, Trajectory]:
     """The changed scene, its start as the relation expects it, and its start by Gauss's principle, with the
     bodies in the order of the expected start; the test is skipped if the relation cannot change the scene."""
-    made = start(SCENES[name])
+    made = exact_start(SCENES[name])
     changed = RELATIONS[relation].change(SCENES[name], made)
     if isinstance(changed, Outside):
         pytest.skip(str(changed))
-    expected, found = RELATIONS[relation].expect(SCENES[name], made), start(changed)
+    expected, found = RELATIONS[relation].expect(SCENES[name], made), exact_start(changed)
     order = [found.bodies.index(body) for body in expected.bodies]
     fields = {field: getattr(found, field)[:, order] for field in (*FIELDS, "orientation")}
     return changed, expected, replace(found, bodies=expected.bodies, **fields)

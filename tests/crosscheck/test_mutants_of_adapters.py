@@ -167,8 +167,7 @@ def test_planted_defect_moves_an_adapter_off_the_reference(way, defect, monkeypa
 
 @pytest.mark.parametrize("name", sorted({package(way) for way in WAYS}))
 def test_each_adapter_is_tried_with_each_kind_of_defect(name):
-    """DEFECTS has a defect of every kind (KINDS) for the adapter, or UNABLE says why it has none of this
-    kind."""
+    """DEFECTS has a defect of every kind (KINDS) for the adapter, or UNABLE says why it has none."""
     found = {one["kind"] for way, defects in DEFECTS.items() if package(way) == name for one in defects}
     assert set(KINDS) - found == set(UNABLE.get(name, {}))
 

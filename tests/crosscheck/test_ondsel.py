@@ -16,6 +16,7 @@ from mbref.scene import Distance, Driver, Moment, Revolute, Scene, Sine
 from mbref.scenes import SCENES
 from tests.crosscheck import tree_scenes
 from tests.crosscheck.measured import MARGIN, ROUNDING, completed_error
+from tests.helpers import parts
 
 pytest.importorskip("pyondsel", reason="the optional engine OndselSolver needs pyondsel")
 
@@ -87,8 +88,8 @@ def clockwork(swapped: bool) -> Scene:
         Driver(joint="rev", polynomial=(0.0, 3.0, 4.0)),
         Driver(joint="cyl", polynomial=(0.0, -1.0), sine=Sine(amplitude=0.3, frequency=5.0)),
     )
-    parts = {"body": bodies, "joint": joints, "driver": drivers}
-    return Scene(name="clockwork", gravity=(0.5, -9.81, 2.0), duration=0.3, **parts)
+    made = {"body": bodies, "joint": joints, "driver": drivers}
+    return Scene(name="clockwork", gravity=(0.5, -9.81, 2.0), duration=0.3, **made)
 
 
 @pytest.mark.parametrize("swapped", [False, True])

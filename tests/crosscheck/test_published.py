@@ -57,8 +57,7 @@ def test_freedoms_and_redundant_rows_are_as_published(name):
 
 @pytest.mark.parametrize("name", FREEDOMS)
 def test_mbref_moves_as_the_reference(name):
-    """Over 0.2 s or BRIEF, in which a body moves by over 1 mm; MEASURED has the errors, times 10 is
-    allowed."""
+    """Over 0.2 s or BRIEF, in which a body moves by over 1 mm; 10 times the errors of MEASURED is allowed."""
     run, exact = run_and_reference(name)
     off = np.abs(run.position - exact.position).max()
     assert off < MARGIN * MEASURED[name], f"{name}: mbref is {off:.1e} m from the reference"

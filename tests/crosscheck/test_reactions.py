@@ -47,8 +47,7 @@ def door(kind: type) -> Scene:
 
 
 def test_two_ball_hinges_share_only_the_force_along_their_line():
-    """Statics leaves one component of each ball open: equal and opposite forces along the line through both,
-    z."""
+    """Statics leaves one component of each ball open: equal and opposite forces along the line of both, z."""
     shared = shared_wrenches(door(Spherical), 0.0, *initial_poses(door(Spherical)))
     for name, basis in shared.items():
         assert basis.shape == (6, 1), f"{name}: {basis.shape[1]} shared wrenches, by hand 1"
@@ -94,8 +93,7 @@ def test_joints_share_at_most_as_many_components_as_there_are_redundant_rows(nam
 
 
 def test_hinges_of_a_door_carry_its_weight_together():
-    """The vertical resultant of both hinges' reactions by mbref is 10 kg · 9.81 m/s² = 98.1 N at each
-    sample."""
+    """The vertical resultant of both hinges' reactions is 10 kg · 9.81 m/s² = 98.1 N at each sample."""
     scene = door(Spherical)
     assert resultants(scene, run("mbref", scene), np.array([3, 0, 1]))[:, 0, 2] == pytest.approx(
         98.1, rel=1e-9

@@ -137,8 +137,7 @@ def test_two_planted_differences_are_the_first_explanation(name, table):
 
 
 def test_column_states_the_time_at_which_its_error_begins(table):
-    """One column is 1 mm off after 0.2501 s; samples are 5 ms apart, so that the first wrong one is 0.255
-    s."""
+    """One column is 1 mm off after 0.2501 s; samples are 5 ms apart: the first wrong one is at 0.255 s."""
     late = {**table, "upper.position.x": table["upper.position.x"] + 1e-3 * (TIMES > 0.2501)}
     column = next(c for c in judge_motion(SCENE, late).columns if not c.is_right)
     assert column.name == "upper.position.x" and column.begins == pytest.approx(0.255)

@@ -5,27 +5,19 @@ import pytest
 
 from crosscheck.conformance.mechanisms.hard import HARD
 from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
-from crosscheck.judge.arithmetic import EXTENDED, many_digits
+from crosscheck.judge.arithmetic import EXTENDED
 from crosscheck.judge.reference.bound import differences
 from crosscheck.judge.reference.reference import judged, runs
 from crosscheck.judge.reference.start_velocities import least_squares, start_velocities
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref.scene import Scene, TorsionSpring
+from tests.crosscheck.measured import in_many_digits
 
 SECONDS = 200.0
 QUICK = ("stiff_spring", "rounded_redundancy", "planes")
 SHORTER = {"near_singular": 0.5, "whip": 0.25, "point_masses": 0.5}  # s
 CROSSING = ("two_crossings",)  # over two singular positions, where more digits move another mechanism
-
-
-def in_many_digits(scene: Scene, times: np.ndarray) -> np.ndarray:
-    """Positions (k, nb, 3) of the scene by formulation A in thirty digits, with other rows."""
-    pytest.importorskip("flint", reason="python-flint is the extra `certify`")
-    motion = natural_motion(scene, times, many_digits(30), order=34, tolerance=1e-24, seed=2, seconds=SECONDS)
-    assert not motion.reason
-    texts = [x.str(30, radius=False) for x in motion.position.ravel()]
-    return np.array([EXTENDED.dtype(x) for x in texts]).reshape(motion.position.shape)
 
 
 @pytest.mark.parametrize(
@@ -42,7 +34,7 @@ def test_reference_of_a_hard_mechanism_is_within_its_bound_of_thirty_digits(name
     a, second, b = runs(scene, times, SECONDS)
     found, reason = judged(scene, times, a, second, b)
     assert not reason
-    place = in_many_digits(scene, times)
+    place = in_many_digits(scene, times, SECONDS).position
     off = np.abs(a.position - place).max(axis=(1, 2))
     assert (off <= found.bound).all() and found.bound.max() <= 1e-12
 

@@ -65,14 +65,9 @@ def test_simbody_follows_polynomial_and_sine_drivers() -> None:
     """t - 2 t² + 3 t³ (rad) of a cylinder, 0.05 (sin(7 t + 0.4) - sin 0.4) (m) of a slide; measured deviation
     1.6e-13. Accelerations are Pinocchio's to 8.1e-9 m/s²."""
     pytest.importorskip("pinocchio")
-    scene = prescribed(
-        Driver(joint="cyl", polynomial=(0.0, 1.0, -2.0, 3.0)),
-        Driver(
-            joint="tra",
-            polynomial=(-0.05 * np.sin(0.4),),
-            sine=Sine(amplitude=0.05, frequency=7.0, phase=0.4),
-        ),
-    )
+    wave = Sine(amplitude=0.05, frequency=7.0, phase=0.4)
+    slide = Driver(joint="tra", polynomial=(-0.05 * np.sin(0.4),), sine=wave)
+    scene = prescribed(Driver(joint="cyl", polynomial=(0.0, 1.0, -2.0, 3.0)), slide)
     run = simulate(scene, 0.4, 1e-10)
     assert run.outcome is Outcome.COMPLETED, run.message
     moved = joint_coordinates(scene, run.times, run.position, run.orientation, run.angular_velocity)

@@ -54,8 +54,7 @@ def test_judge_finds_the_eigenvalues_of_closed_forms(judged):
 
 
 def test_steady_poses_are_balanced_with_symmetric_positive_mass_matrix(judged):
-    """Unbalanced forces are rounding, below 1e-13; eigenvalues come in conjugate pairs, as of real
-    equations."""
+    """Unbalanced forces are rounding, below 1e-13; eigenvalues are conjugate pairs, as of real equations."""
     _, found = judged
     for each in found:
         assert np.abs(each.balance.unbalanced(each.state).astype(float)).max() < 1e-13

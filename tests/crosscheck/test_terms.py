@@ -57,10 +57,7 @@ def error(scene: Scene, run: Trajectory) -> float:
 
 
 TERMS = Setting("terms", {"rtol": 1e-9, "min_step": 1e-4})
-AT_START, LATER = (
-    1e-13,
-    6e-10,
-)  # measured differences: accelerations at t = 0, of the largest; poses at the end
+AT_START, LATER = 1e-13, 6e-10  # measured: accelerations at t = 0, of the largest; poses at the end
 REACTIONS = 6e-7  # measured imbalance of reactions at the end, of the largest force
 LIGHT = 1.1e-10  # accelerations of bodies of 1e-6 of the mass of others
 
@@ -115,19 +112,9 @@ def test_driver_beyond_the_reach_ends_a_run_with_a_reason(name: str) -> None:
 
 
 ONE_STEP, TINY = 2e-4, 1e-5  # relative error of accelerations by a step of TINY (s), of first order
-ONE_STEP_OF = (
-    "pushed body",
-    "force load",
-    "moment load",
-    "spring load",
-    "torsion_spring load",
-    "cylindrical joint",
-    "universal joint",
-    "planar joint",
-    "distance joint",
-    "floating pair",
-    "door",
-)
+ONE_STEP_OF = [f"{kind} load" for kind in ("force", "moment", "spring", "torsion_spring")]
+ONE_STEP_OF += [f"{kind} joint" for kind in ("cylindrical", "universal", "planar", "distance")]
+ONE_STEP_OF += ["pushed body", "floating pair", "door"]
 
 
 @pytest.mark.parametrize("name", [of("drake"), of("dart"), of("bullet")])

@@ -203,8 +203,7 @@ def test_symmetric_top_precesses_about_its_angular_momentum():
 
 
 def test_free_body_falls_and_keeps_energy_and_angular_momentum():
-    """The centre falls as r + v t + g t² / 2; angular momentum and energy are those of the start, to
-    rounding."""
+    """The centre falls as r + v t + g t² / 2; angular momentum and energy stay, to rounding."""
     scene = free(gravity=(0.0, 0.0, -9.81), duration=5.0)
     t = np.linspace(0, 5.0, 40)
     motion = truth_for(scene).poses(t)

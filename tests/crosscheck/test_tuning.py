@@ -23,8 +23,7 @@ SCENE = Scene(name="block", body=(BLOCK,), duration=1.0)
 
 
 class Family(NamedTuple):
-    """A run with step h has the error factor · h^order, takes cost / h seconds, and fails above
-    ``longest``."""
+    """A run with step h has the error factor · h^order, takes cost / h seconds, fails above ``longest``."""
 
     order: float
     factor: float = 1.0
@@ -33,8 +32,7 @@ class Family(NamedTuple):
 
 
 class Modelled:
-    """A model of an engine's runs, with 1 / h right-hand sides; ``asked`` lists family and step of each
-    run."""
+    """A model of an engine's runs, with 1 / h right-hand sides; ``asked`` has family and step of each run."""
 
     def __init__(self, **families: Family) -> None:
         self.families, self.asked = families, []

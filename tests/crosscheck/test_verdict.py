@@ -4,6 +4,7 @@ import io
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,25 +30,12 @@ TRUTH = {"kind": "reference", "bound": 3e-14, "reason": "", "until": 1.0, "secon
 def record(
     engine: str, family: str, error: float | None, seconds: float = 0.1, **more: Any
 ) -> dict[str, Any]:
+    found = {"scene": REDUNDANT.name, "engine": engine, "family": family, "version": "1", "versions": {}}
+    found |= {"outcome": "COMPLETED", "message": "", "t_end": 1.0, "times": [], "time_limit": 60.0}
+    found |= {"settings": {"seconds": seconds}, "cost": {"seconds": seconds}, "machine": {"cpu": "a"}}
+    found |= {"metrics": {"error": error, "error_bound": 3e-14}, "key": f"{engine} {family} {seconds}"}
     asked = {"engine": engine, "options": {"s": seconds}, "samples": 3, "end": 1.0}
-    found = {
-        "scene": REDUNDANT.name,
-        "engine": engine,
-        "family": family,
-        "settings": {"seconds": seconds},
-        "outcome": "COMPLETED",
-        "message": "",
-        "t_end": 1.0,
-        "times": [],
-        "cost": {"seconds": seconds},
-        "versions": {},
-        "metrics": {"error": error, "error_bound": 3e-14},
-        "key": f"{engine} {family} {seconds}",
-        "version": "1",
-        "machine": {"cpu": "a"},
-        "asked": asked,
-    }
-    return {**found, "time_limit": 60.0, **more}
+    return {**found, "asked": asked, **more}
 
 
 def failed(engine: str, family: str, t_end: float = 0.0) -> dict[str, Any]:
@@ -210,16 +198,10 @@ def test_errors_below_the_truth_s_bound_are_drawn_at_the_bound():
 def test_tables_of_eighty_columns_cut_no_number():
     """Each number stands whole in the tables of comparison and of runs. An end time of -1e-8 s is rounding,
     and printed in neither; nor is a time of zero for a run that failed at its start."""
-    measured = {
-        "error": 2.71e-5,
-        "error_bound": 1e-14,
-        "violation_position": 1.13e-13,
-        "energy_error": 2.5e-12,
-    }
+    errors = {"error": 2.71e-5, "error_bound": 1e-14, "energy_error": 2.5e-12}
+    own = partial(record, "pinocchio", "defaults", None, metrics={**errors, "violation_position": 1.13e-13})
     long = [
-        record(
-            "pinocchio", "defaults", None, 7.8125e-06, settings={"accuracy": s}, metrics=measured, outcome=end
-        )
+        own(7.8125e-06, settings={"accuracy": s}, outcome=end)
         for s, end in ((0.0001, "COMPLETED"), (7.8125e-06, "NOT_CONVERGED"))
     ]
     long.append(failed("exudyn", "alf-dual+projection, compiled"))

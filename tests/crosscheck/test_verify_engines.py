@@ -35,8 +35,7 @@ def known(name: str, scenes: tuple[str, ...]) -> set[tuple[str, str, str]]:
 
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_built_in_engine_violates_no_check_on_six_probes(name):
-    """Checks of the suite, such as truth, energy and reactions; KNOWN has those that fail, with the
-    reason."""
+    """Checks of the suite, such as truth, energy and reactions; KNOWN has those that fail, with a reason."""
     found = violations(name, QUICK, related=False)
     assert set(found) == known(name, QUICK), found
 

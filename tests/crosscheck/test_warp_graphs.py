@@ -13,8 +13,7 @@ STEP, COUNT = 1e-3, 20
 
 @pytest.mark.parametrize("family", ["stock", "euler", "defaults"])
 def test_recorded_graph_of_mujoco_warp_moves_as_its_single_steps(family: str) -> None:
-    """20 steps of 1 ms by the adapter's graph and by the library's own step function: equal to the last
-    bit."""
+    """20 steps of 1 ms by the adapter's graph and the library's own step function: equal to the last bit."""
     warp = pytest.importorskip("mujoco_warp")
     scene = DIFFICULTIES[0].make()
     recorded, plain = (of_warp.ENGINE.world(scene, Setting(family, {"step": STEP})) for _ in range(2))

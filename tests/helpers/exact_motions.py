@@ -8,7 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.judge import constraints
+from crosscheck.judge.gauss_principle import gauss
+from crosscheck.judge.reaction_balance import with_exact_reactions
 from crosscheck.judge.truth import truth_for
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 from tests.helpers.short_motions import MOTIONS, times_of
 
@@ -26,6 +30,17 @@ def exact(scene: Scene) -> dict[str, Any]:
         for name in ("position", "orientation", "velocity", "angular_velocity")
     }
     return {"by": truth.name, "bound": truth.accuracy, **states}
+
+
+@functools.cache
+def exact_start(scene: Scene) -> Trajectory:
+    """Return the start of a scene with accelerations by Gauss's principle, and reactions by balances."""
+    pose, twist = constraints.initial_poses(scene), constraints.initial_twists(scene)
+    both, count = gauss(scene), len(scene.body)
+    rates = both[:count], both[count:] / constraints.scene_length(scene)
+    run = (scene.name, "judge", "", "", {}, np.zeros(1), tuple(body.name for body in scene.body))
+    start = Trajectory(*run, *(np.array(state)[None] for state in (*pose, *twist, *rates)))
+    return with_exact_reactions(scene, start)
 
 
 @functools.cache

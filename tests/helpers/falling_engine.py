@@ -41,21 +41,10 @@ class Falling(Engine):
         count, factor = (len(times), len(scene.body)), setting.options.get("factor", FACTOR)
         change = factor * np.tile(scene.gravity, (*count, 1))
         t, still = times[:, None, None], np.zeros((*count, 3))
-        return Trajectory(
-            scene=scene.name,
-            engine=self.name,
-            version=self.version(),
-            method=setting.family,
-            settings=dict(setting.options),
-            times=times,
-            bodies=tuple(body.name for body in scene.body),
-            position=change * t**2 / 2 + [body.position for body in scene.body],
-            orientation=np.tile([1.0, 0.0, 0.0, 0.0], (*count, 1)),
-            velocity=change * t,
-            angular_velocity=still,
-            acceleration=change,
-            angular_acceleration=still,
-        )
+        places = change * t**2 / 2 + [body.position for body in scene.body]
+        turns, rates = np.tile([1.0, 0.0, 0.0, 0.0], (*count, 1)), (change * t, still, change, still)
+        asked = (scene.name, self.name, self.version(), setting.family, dict(setting.options))
+        return Trajectory(*asked, times, tuple(body.name for body in scene.body), places, turns, *rates)
 
     def uses(self):
         """Name a function of the library, which is not called."""

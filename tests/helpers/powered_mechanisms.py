@@ -90,8 +90,7 @@ def _likely(scene: Scene, rng: Rng) -> Iterator[Joint]:
 
 
 def _driven(scene: Scene, joint: Joint, rng: Rng) -> Scene:
-    """Return the scene with a driver of the joint that begins at rest; without one if no motion would
-    remain."""
+    """Return the scene with a driver of the joint that begins at rest; without one if no motion remains."""
     amplitude, frequency, phase, square = rng.uniform((-0.1, 3.0, -3.0, -2.0), (0.1, 40.0, 3.0, 2.0)).tolist()
     wave = Sine(amplitude=amplitude, frequency=frequency, phase=phase)
     start = -amplitude * np.sin(phase), -amplitude * frequency * np.cos(phase)

@@ -41,22 +41,12 @@ class Still(Engine):
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         self.act(scene)
         nothing = np.zeros((len(times), len(scene.body), 3))
-        return Trajectory(
-            scene.name,
-            self.name,
-            self.version(),
-            setting.family,
-            dict(setting.options),
-            np.array(times),
-            tuple(body.name for body in scene.body),
-            nothing + [body.position for body in scene.body],
-            np.zeros((*nothing.shape[:2], 4)) + [body.orientation for body in scene.body],
-            nothing,
-            nothing,
-            message=self.message,
-            t_end=float(times[-1]),
-            cost=Cost(seconds=0.1),
-        )
+        places = nothing + [body.position for body in scene.body]
+        turns = np.zeros((*nothing.shape[:2], 4)) + [body.orientation for body in scene.body]
+        asked = (scene.name, self.name, self.version(), setting.family, dict(setting.options))
+        names = tuple(body.name for body in scene.body)
+        end = {"message": self.message, "t_end": float(times[-1]), "cost": Cost(seconds=0.1)}
+        return Trajectory(*asked, np.array(times), names, places, turns, nothing, nothing, **end)
 
     def act(self, scene: Scene) -> None:
         """Do nothing more."""

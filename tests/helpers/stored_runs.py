@@ -11,21 +11,12 @@ FIRST, SECOND = DIFFICULTIES[:2]
 def measured(error: float | None, family: str = "tuned", engine: str = "mujoco", **changes: Any) -> dict:
     """Return the record of a run with an error; an outcome other than COMPLETED ends it at 0.3 s."""
     is_whole = changes.get("outcome", "COMPLETED") == "COMPLETED"
-    record = {
-        "key": f"{engine} {family} {error} {changes.get('scene', '')}",
-        "scene": FIRST.scene,
-        "engine": engine,
-        "version": "4.0.0",
-        "family": family,
-        "asked": {"engine": engine, "options": {"step": 1e-3}, "end": 1.0, "samples": 21},
-        "time_limit": 60.0,
-        "outcome": "COMPLETED",
-        "message": "" if is_whole else "the Jacobian is singular",
-        "t_end": 1.0 if is_whole else 0.3,
-        "metrics": {} if error is None else {"error": error},
-        "cost": {"seconds": 0.5},
-    }
-    return {**record, **changes}
+    record = {"scene": FIRST.scene, "engine": engine, "family": family, "version": "4.0.0"}
+    record |= {"outcome": "COMPLETED", "message": "" if is_whole else "the Jacobian is singular"}
+    record |= {"t_end": 1.0 if is_whole else 0.3, "metrics": {} if error is None else {"error": error}}
+    asked = {"engine": engine, "options": {"step": 1e-3}, "end": 1.0, "samples": 21}
+    key = f"{engine} {family} {error} {changes.get('scene', '')}"
+    return {**record, "key": key, "asked": asked, "time_limit": 60.0, "cost": {"seconds": 0.5}, **changes}
 
 
 def refused(engine: str = "mujoco") -> dict:

@@ -51,30 +51,19 @@ def record(
     a_scene = a_scene or scene()
     true = exact(a_scene, share=share)
     shift = np.array([error * scene_length(a_scene), 0.0, 0.0])
-    shifted = dataclasses.replace(
-        true,
-        engine=engine,
-        version="1.0",
-        method=family,
-        settings=settings,
-        outcome=outcome,
-        position=true.position + shift,
-        t_end=share * a_scene.duration,
-        message="" if outcome is Outcome.COMPLETED else f"{outcome.sentence} | early\nindeed",
-        cost=Cost(seconds=seconds, steps=steps, rhs=4 * steps),
-        scene=a_scene.name,
-    )
-    metrics = measure(a_scene, shifted, truth_for(a_scene))
+    said = "" if outcome is Outcome.COMPLETED else f"{outcome.sentence} | early\nindeed"
+    run = {"engine": engine, "version": "1.0", "method": family, "settings": settings, "scene": a_scene.name}
+    run |= {"outcome": outcome, "message": said, "t_end": share * a_scene.duration}
+    run |= {"position": true.position + shift, "cost": Cost(seconds=seconds, steps=steps, rhs=4 * steps)}
+    shifted = dataclasses.replace(true, **run)
     key = hashlib.sha256(f"{a_scene.name} {engine} {family} {settings} {error}".encode()).hexdigest()
-    return {
-        **MADE_OF,
-        **shifted.to_record(),
-        "scene": a_scene.name,
-        "family": family,
-        "asked": asked(a_scene, engine, settings),
-        "key": key,
-        "metrics": metrics,
-    }
+    return stored(shifted, a_scene, asked(a_scene, engine, settings), key)
+
+
+def stored(run: Trajectory, a_scene: Scene, asked: dict[str, Any], key: str) -> dict[str, Any]:
+    """The record of a run as a study stores it, with its metrics."""
+    known = {"scene": a_scene.name, "family": run.method, "asked": asked, "key": key}
+    return {**MADE_OF, **run.to_record(), **known, "metrics": measure(a_scene, run, truth_for(a_scene))}
 
 
 def asked(a_scene: Scene, engine: str, options: dict[str, Any]) -> dict[str, Any]:
@@ -84,25 +73,10 @@ def asked(a_scene: Scene, engine: str, options: dict[str, Any]) -> dict[str, Any
 def nothing(engine: str, family: str, a_scene: Scene | None = None) -> dict[str, Any]:
     """The record of a run that crashed without a state."""
     a_scene = a_scene or scene()
-    lost = Trajectory.failed(
-        scene=a_scene.name,
-        engine=engine,
-        version="",
-        method=family,
-        settings={},
-        outcome=Outcome.CRASHED,
-        bodies=tuple(b.name for b in a_scene.body),
-        message="the process was ended by SIGSEGV",
-    )
-    metrics = measure(a_scene, lost, truth_for(a_scene))
-    more = {
-        "scene": a_scene.name,
-        "family": family,
-        "key": f"{engine} {family}",
-        "metrics": metrics,
-        "asked": asked(a_scene, engine, {}),
-    }
-    return {**MADE_OF, **lost.to_record(), **more}
+    run = {"scene": a_scene.name, "engine": engine, "version": "", "method": family, "settings": {}}
+    end = {"outcome": Outcome.CRASHED, "message": "the process was ended by SIGSEGV"}
+    lost = Trajectory.failed(**run, **end, bodies=tuple(b.name for b in a_scene.body))
+    return stored(lost, a_scene, asked(a_scene, engine, {}), f"{engine} {family}")
 
 
 @functools.cache

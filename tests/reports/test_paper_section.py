@@ -42,27 +42,13 @@ def record(case: Case, outcome: Outcome, t_end: float, steps: int) -> dict[str, 
     """The record of a run that moved exactly and ended so."""
     scene = case.scene
     exact, metrics = motion(scene, np.asarray(case.times))
-    made = dataclasses.replace(
-        exact,
-        engine="mbref",
-        version="1",
-        method=case.setting.family,
-        settings=dict(case.setting.options),
-        outcome=outcome,
-        t_end=t_end,
-        message="" if outcome is Outcome.COMPLETED else outcome.sentence,
-        cost=Cost(seconds=0.01 * t_end, steps=steps),
-        scene=scene.name,
-    )
-    return {
-        **MADE_OF,
-        **made.to_record(),
-        "scene": scene.name,
-        "family": case.setting.family,
-        "key": "",
-        "asked": {"engine": "mbref", "options": {}, "samples": 3, "end": t_end},
-        "metrics": metrics,
-    }
+    family, options = case.setting.family, case.setting.options
+    run = {"engine": "mbref", "version": "1", "method": family, "settings": dict(options)}
+    run |= {"outcome": outcome, "message": "" if outcome is Outcome.COMPLETED else outcome.sentence}
+    run |= {"scene": scene.name, "t_end": t_end, "cost": Cost(seconds=0.01 * t_end, steps=steps)}
+    known = {"scene": scene.name, "family": family, "key": "", "metrics": metrics}
+    known |= {"asked": {"engine": "mbref", "options": {}, "samples": 3, "end": t_end}}
+    return {**MADE_OF, **dataclasses.replace(exact, **run).to_record(), **known}
 
 
 @pytest.fixture(scope="module")
@@ -221,16 +207,9 @@ def test_digits_of_exact_accelerations_are_all_and_of_a_run_that_failed_at_its_s
     for name, errors in paper_methods.digit_errors(records).items():
         assert max(errors) < 1e-14, (name, errors)
     missing = Label("digits", "alf", "100")
-    lost = Trajectory.failed(
-        scene=records[missing]["scene"],
-        engine="mbref",
-        version="1",
-        method="alf",
-        settings={},
-        bodies=("crank", "rod", "slider"),
-        outcome=Outcome.NOT_CONVERGED,
-        message="",
-    )
+    run = {"scene": records[missing]["scene"], "engine": "mbref", "version": "1", "method": "alf"}
+    run |= {"settings": {}, "bodies": ("crank", "rod", "slider"), "message": ""}
+    lost = Trajectory.failed(**run, outcome=Outcome.NOT_CONVERGED)
     other = {**records, missing: {**MADE_OF, **lost.to_record(), "scene": records[missing]["scene"]}}
     assert np.isnan(paper_methods.digit_errors(other)["alf"][0])
 
