@@ -49,7 +49,7 @@ def test_tuned_mujoco_stays_within_its_measured_error_of_the_truth(name: str) ->
     assert completed_error(run, scene) < MARGIN * measured
 
 
-@pytest.mark.parametrize(("family", "order"), [("stock", 2), ("euler", 1), ("implicit", 1)])
+@pytest.mark.parametrize(("family", "order"), [("stock", 2), ("euler", 1), ("implicit", 1), ("discrete", 1)])
 def test_mujoco_s_integrators_converge_with_their_order(family: str, order: int) -> None:
     """Order of the sweep's errors by the truth. The softness of stock closures falls with the square of the
     step, so that RK4 is of second order here; the orders measured are within 0.15 of whole numbers."""

@@ -51,7 +51,7 @@ FAMILIES = {
     "euler": "like stock, first-order integrator Euler",
     "implicit": "like stock, first-order integrator implicit",
     "implicitfast": "like stock, first-order integrator implicitfast; only where a load damps",
-    "discrete": "like stock, first-order integrator discrete, which MuJoCo has since 3.13",
+    "discrete": "like stock, first-order integrator discrete, which MuJoCo has since 3.13; without drivers",
     "tuned": "the regulariser made negligible through invweight0, critically damped closures at five "
     "times the "
     f"fastest rate of the scene, RK4, Newton's method iterated to convergence; {DENSE}",
@@ -143,11 +143,15 @@ def _rounded(number: float) -> float:
 
 
 def _stock(scene: Scene) -> list[str]:
-    """Return the families with default closures whose integrators MuJoCo has and differ on the scene."""
+    """Return the families with default closures whose integrators MuJoCo has and differ on the scene.
+
+    The integrator discrete does not use the reference accelerations that the adapter writes for drivers.
+    """
     import mujoco
 
     is_damped = any(load.is_damped for load in scene.load)
     known = [family for family, name in STOCK.items() if hasattr(mujoco.mjtIntegrator, name)]
+    known = [family for family in known if family != "discrete" or not scene.driver]
     return [family for family in known if is_damped or family != "implicitfast"]
 
 

@@ -11,7 +11,7 @@ from crosscheck.conformance.mechanisms.large_graphs import FEWEST, MOST, large_g
 from crosscheck.conformance.mechanisms.specimens import Specimen
 from crosscheck.conformance.runners import InProcess
 from crosscheck.conformance.trial import set_up
-from crosscheck.engine import engine
+from crosscheck.engine import engine, installed
 from crosscheck.judge.connected_parts import factored, least_constraint, parts
 from crosscheck.judge.constraints import closure, closure_rates, initial_poses, initial_twists, jacobian
 from crosscheck.judge.gauss_principle import gauss, rank
@@ -70,6 +70,18 @@ def test_violation_on_a_random_mechanism_is_printed_with_its_check_and_numbers()
     tally.add({"version": "1.0", "verdicts": [suite.record_of(failed)]})
     said = [str(block) for block in tables(tally)]
     assert f"fail: drawn_0, {failed.check()}: 0.5, allowed 0.001 why" in said, said
+
+
+@pytest.mark.parametrize(
+    "name", ["pinocchio", "dart", "simbody", pytest.param("sundials", marks=pytest.mark.slow)]
+)
+def test_ways_of_an_engine_agree_on_loops_that_are_closed_at_the_ground(name: str):
+    """15 bodies, and a loop whose first joint is at the ground; each adapter has its limit."""
+    if not installed(name):
+        pytest.skip(f"{name} is not installed")
+    bench = set_up(InProcess(engine(name)), Specimen(large_graph(3), large=True))
+    found = suite.verdict_on("alternatives", bench)
+    assert found.status == suite.PASS and len(engine(name).alternatives[0].ways) > 1, found
 
 
 @pytest.mark.slow
