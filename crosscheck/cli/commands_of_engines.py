@@ -26,7 +26,9 @@ def add_files(commands: Commands) -> None:
     about = (
         "read one MJCF, URDF or SDF file by the own reader of each engine, and show which machine each one "
         "built, against the specification of the format: bodies, joints, loops, couplings, gravity, and the "
-        "engine's own mass matrix and gravity torques at four poses. Each reader runs in a process of its "
+        "engine's own mass matrix, gravity torques and accelerations at four poses. A grade says `the same "
+        "machine`, `the same except for` limits or forces of joints, `another machine`, or `cannot read`. "
+        "Changes of the file that help a reader are tried and named. Each reader runs in a process of its "
         "own. Exit status: 0 if all readers build the file's machine, 1 if one does not, 2 for a faulty file"
     )
     example = (

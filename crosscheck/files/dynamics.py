@@ -1,11 +1,12 @@
 """Accelerations of a machine that is a tree of hinges and slides, and their differences from an engine's.
 
-M a = -g - c - d v - k (q - rest): mass matrix M and gravity torques g, dampers d, springs k, and velocity
-terms c = Ṁ v - ½ ∂(vᵀ M v)/∂q, from differences of order four of M along the coordinates.
+M a = -g - c - Σ dₙ v |v|ⁿ - Σ kₙ xⁿ⁺¹: mass matrix M and gravity torques g, dampers d, springs k stretched by
+x, and velocity terms c = Ṁ v - ½ ∂(vᵀ M v)/∂q, from differences of order four of M along the coordinates.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -19,19 +20,17 @@ from crosscheck.files.statics import Pose, statics_of
 
 SPEED, SEED = 1.0, 11  # largest rates: rad/s, and machine's sizes per s
 MOST = 30  # joints; the differences of M need four evaluations for each joint
-UNUSED = "read, and not used by its dynamics"
+UNUSED = ("read, and not used by its dynamics", "read, and used by its dynamics in the first number only")
 STEP = 1e-3  # rad or m, of the differences, whose error is about STEP^4
 NONE = (0.0, 0.0, 0.0)  # m/s²
 FACTORS = ((-2.0, 1 / 12), (-1.0, -8 / 12), (1.0, 8 / 12), (2.0, -1 / 12))  # displacement / STEP, weight
 
 
 def moves_alone(machine: Machine) -> bool:
-    """Return whether the machine is a tree of at most MOST hinges and slides with linear springs and
-    dampers."""
+    """Return whether the machine is a tree of at most MOST hinges and slides."""
     moving = [joint for joint in machine.joints if joint.type != FIXED]
-    is_linear = all(len(j.damping or ()) < 2 and len(j.stiffness or ()) < 2 for j in moving)
     is_tree = not machine.loops and not machine.couplings
-    return is_tree and is_linear and 0 < len(moving) <= MOST and all(j.type in SCALAR for j in moving)
+    return is_tree and 0 < len(moving) <= MOST and all(joint.type in SCALAR for joint in moving)
 
 
 def random_rates(machine: Machine, size: float, number: int) -> list[Pose]:
@@ -55,7 +54,8 @@ def accelerations_of(
     for k, name in enumerate(found.joints):
         joint = joints[name]
         stretched = pose[name] + (joint.reference or 0.0) - (joint.rest or 0.0)
-        force[k] -= sum(joint.damping or ()) * v[k] + sum(joint.stiffness or ()) * stretched
+        force[k] -= sum(d * v[k] * abs(v[k]) ** n for n, d in enumerate(joint.damping or ()))
+        force[k] -= sum(c * stretched ** (n + 1) for n, c in enumerate(joint.stiffness or ()))
     return dict(zip(found.joints, np.linalg.solve(mass, force).tolist(), strict=True))
 
 
@@ -78,19 +78,19 @@ def of_dynamics(
 ) -> list[Difference]:
     """Return the largest difference of accelerations, relative to the largest acceleration.
 
-    If they are the accelerations without dampers, or without springs, the numbers of these are returned.
+    If they are the accelerations without dampers or springs, or with the linear ones alone, the numbers of
+    these are returned.
     """
     states = list(zip(poses, rates, own, strict=False))
     size, found = _worst(match.file, states, gravity)
     if found is None or size <= tolerance:
         return []
-    for field in ("damping", "stiffness"):
-        having = [joint for joint in match.file.joints if any(getattr(joint, field) or ())]
-        nothing: dict[str, Any] = {field: ()}
-        without = {joint.name: replace(joint, **nothing) for joint in having}
-        joints = tuple(without.get(joint.name, joint) for joint in match.file.joints)
+    for field, (kept, words) in itertools.product(("damping", "stiffness"), enumerate(UNUSED)):
+        having = [joint for joint in match.file.joints if len(getattr(joint, field) or ()) > kept]
+        less: dict[str, Any] = {j.name: {field: getattr(j, field)[:kept]} for j in having}
+        joints = tuple(replace(joint, **less.get(joint.name, {})) for joint in match.file.joints)
         if having and _worst(replace(match.file, joints=joints), states, gravity)[0] <= tolerance:
-            return [Difference(WRONG, "joint", j.name, field, getattr(j, field), UNUSED) for j in having]
+            return [Difference(WRONG, "joint", j.name, field, getattr(j, field), words) for j in having]
     return [found]
 
 

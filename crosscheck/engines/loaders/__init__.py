@@ -10,6 +10,7 @@ from crosscheck.engines.loaders.loader import Loader
 PLACES: Mapping[str, str] = {  # names of loaders and their classes, in the order of tables
     "mbref": "own:Own",
     "mujoco": "mujoco:Mujoco",
+    "mjx": "mjx:Mjx",
     "pinocchio": "pinocchio:Pinocchio",
     "drake": "drake:Drake",
     "dart": "dart:Dart",

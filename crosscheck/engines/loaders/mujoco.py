@@ -158,33 +158,41 @@ class Compiled(Loaded):
                 (first, second), law = row.joints, coefficients(row.offset, row.ratio)
             yield Coupling(name, self.joint(first), self.joint(second) if second >= 0 else "", law)
 
-    def statics(self, pose: Mapping[str, float], gravity: Vector) -> Statics:
-        m, data = self.model, self.data
+    def dofs(self) -> dict[str, int]:
+        """Return the index of the velocity of each hinge and slide."""
+        m = self.model
         single = [j for j in range(m.njnt) if TYPES[int(m.jnt_type[j])] in (REVOLUTE, TRANSLATIONAL)]
+        return {self.joint(j): int(m.jnt_dofadr[j]) for j in single}
+
+    def coordinates(self, pose: Mapping[str, float]) -> np.ndarray:
+        """Return the coordinates at displacements of hinges and slides from the reference pose."""
+        m, q = self.model, np.array(self.model.qpos0)
+        for name, dof in self.dofs().items():
+            q[m.jnt_qposadr[m.dof_jntid[dof]]] += pose.get(name, 0.0)
+        return q
+
+    def statics(self, pose: Mapping[str, float], gravity: Vector) -> Statics:
+        m, data, dofs = self.model, self.data, self.dofs()
         m.opt.gravity[:], m.opt.disableflags = gravity, 0
-        data.qpos[:], data.qvel[:] = m.qpos0, 0.0
-        for j in single:
-            data.qpos[m.jnt_qposadr[j]] += pose.get(self.joint(j), 0.0)
+        data.qpos[:], data.qvel[:] = self.coordinates(pose), 0.0
         self.place()
         self.mujoco.mj_comVel(m, data)
         torque = np.zeros(m.nv)
         self.mujoco.mj_rne(m, data, 0, torque)
-        dofs = [int(m.jnt_dofadr[j]) for j in single]
+        places = list(dofs.values())
         centres = {self.body(b): vector(data.xipos[b]) for b in range(1, m.nbody)}
-        names = tuple(self.joint(j) for j in single)
-        return Statics(names, matrix(self._mass()[np.ix_(dofs, dofs)]), vector(torque[dofs]), centres)
+        mass = self._mass()[np.ix_(places, places)]
+        return Statics(tuple(dofs), matrix(mass), vector(torque[places]), centres)
 
     def accelerations(
         self, pose: Mapping[str, float], rates: Mapping[str, float], gravity: Vector
     ) -> dict[str, float]:
-        m, data, bits = self.model, self.data, self.mujoco.mjtDisableBit
+        m, data, bits, dofs = self.model, self.data, self.mujoco.mjtDisableBit, self.dofs()
         m.opt.gravity[:] = gravity
         m.opt.disableflags = int(bits.mjDSBL_CONSTRAINT | bits.mjDSBL_ACTUATION)
-        data.qpos[:], data.qvel[:] = m.qpos0, 0.0
-        dofs = {self.joint(j): int(m.jnt_dofadr[j]) for j in range(m.njnt)}
-        for j in range(m.njnt):
-            data.qpos[m.jnt_qposadr[j]] += pose.get(self.joint(j), 0.0)
-            data.qvel[m.jnt_dofadr[j]] = rates.get(self.joint(j), 0.0)
+        data.qpos[:], data.qvel[:] = self.coordinates(pose), 0.0
+        for name, dof in dofs.items():
+            data.qvel[dof] = rates.get(name, 0.0)
         self.mujoco.mj_forward(m, data)
         return {name: float(data.qacc[dof]) for name, dof in dofs.items()}
 
