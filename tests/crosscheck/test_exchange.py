@@ -119,8 +119,7 @@ def test_piston_of_a_cut_slide_is_read_in_two_parts_with_its_mass_after_a_round_
 
 @pytest.mark.parametrize("name", EXPORTED)
 def test_an_exported_scene_accelerates_in_mujoco_and_moves_when_read_again_as_the_scene(name, tmp_path):
-    """MJCF has no drivers and no start velocities, so that the scene begins at rest, with a gravity of its
-    own."""
+    """MJCF has no drivers and no start velocities: the scene begins at rest, with a gravity of its own."""
     scene = find_scene(name)
     loads = [load for load in scene.load if load.type in ("spring", "torsion_spring")]
     bodies = [b.model_copy(update={"velocity": None, "angular_velocity": None}) for b in scene.body]

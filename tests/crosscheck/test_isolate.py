@@ -181,8 +181,7 @@ def test_an_engine_that_hangs_in_its_preparation_times_out(monkeypatch: pytest.M
 def test_the_last_line_that_an_engine_prints_in_its_preparation_is_known_meanwhile():
     """`starting` gives it for each engine that is being prepared, and nothing afterwards."""
     with ThreadPoolExecutor(1) as thread:
-        setting = Setting("plain", {"seconds": 0.25})
-        made = thread.submit(run_in_turn, f"{FAKES}:COMPILING", still(), TIMES, setting, 60.0)
+        made = thread.submit(run_in_turn, f"{FAKES}:COMPILING", still(), TIMES, PLAIN, 60.0)
         seen = set()
         while not made.done():
             seen |= set(starting().values())

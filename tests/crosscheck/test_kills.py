@@ -8,9 +8,7 @@ from tests import kills
 
 WHOLE = (200, 20)  # runs, kills
 FEW = {"parents": (30, 2), "children": (6, 1), "workers": (6, 1)}
-MOST_REPEATED = (
-    3  # runs not yet stored when a process is killed: two under way, and one that is being written
-)
+MOST_REPEATED = 3  # runs not yet stored when a process is killed: two under way, one being written
 
 
 @pytest.mark.parametrize(

@@ -27,8 +27,7 @@ def hinge(name: str = "A", first: str = "ground", second: str = "b", **parts: An
 
 # --- lengths ----------------------------------------------------------------------------------------------
 def test_scene_length_is_the_largest_distance_of_anchors_and_centres():
-    """Points at (3, 4, 0) and the origin; at (3, 4, 0) and (0, 0, -6), √(5² + 6²) apart; centres 7 m
-    apart."""
+    """Points (3, 4, 0) and the origin; (3, 4, 0) and (0, 0, -6), √(5² + 6²) apart; centres 7 m apart."""
     bar = Distance(name="D", bodies=("ground", "b"), anchors=((0.0, 0.0, -6.0), (3.0, 4.0, 0.0)))
     assert constraints.scene_length(scene(body("b", 3.0, 4.0, 0.0), joint=(hinge(),))) == 5.0
     assert constraints.scene_length(scene(body("b", 3.0, 4.0, 0.0), joint=(bar,))) == math.hypot(5.0, 6.0)

@@ -76,8 +76,7 @@ def test_energy_stays_under_constant_forces_and_undamped_springs_of_joints():
 @pytest.mark.parametrize("name", ("slide_spring load", "joint_torque load", "joint_force load"))
 @pytest.mark.parametrize("of", ["mujoco", "exudyn", "pinocchio"])
 def test_engine_moves_joint_loads_as_the_reference(of, name):
-    """Positions and accelerations of a body on a joint; MEASURED has the differences, and 10 times as much is
-    allowed."""
+    """Positions and accelerations of a body on a joint; 10 times the differences of MEASURED are allowed."""
     assert differences_over_limits(of, PROBES[name]) < 1
 
 

@@ -10,6 +10,7 @@ from tests.helpers.coupled_mechanisms import coupled_loops, gear_pair, pendulum,
 
 # names of built-in scenes with and without redundant rows
 NAMES = ("planar_slider_crank", "four_bar", "bennett", "sarrus", "five_bar_gravity", "andrews_squeezer")
+NAMES += ("four_bar_straight",)  # flat, where one more row is dependent
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -23,8 +24,7 @@ def test_judge_s_rank_of_a_built_in_scene_gives_the_counts_of_mbref(name):
 
 @pytest.mark.parametrize("make", [gear_pair, screw, pendulum, coupled_loops])
 def test_coupling_is_a_constraint_row_and_an_armature_is_none(make):
-    """The judge's count is mbref's without the rotors: mbref models an armature by a hidden body with six
-    coordinates and six rows."""
+    """The judge's count is mbref's without rotors, which are hidden bodies of six coordinates and rows."""
     scene = make()
     counts, found = mbref.counts(scene), mobility(scene)
     rotors = sum(bool(joint.armature) for joint in scene.joint if hasattr(joint, "armature"))

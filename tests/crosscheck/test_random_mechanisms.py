@@ -46,8 +46,7 @@ def test_engines_accelerate_six_random_mechanisms_as_mbref():
 
 @pytest.mark.slow
 def test_engines_accelerate_many_random_mechanisms_as_mbref():
-    """Initial accelerations of 200 mechanisms by three engines and by Gauss's principle, within 10 times
-    MEASURED."""
+    """Initial accelerations of 200 mechanisms by three engines and Gauss's principle, to 10 MEASURED."""
     assert excess(MANY) <= 1
 
 

@@ -25,8 +25,7 @@ def test_random_mechanisms_meet_their_joints_and_drivers_with_the_given_velociti
 
 
 def test_random_mechanisms_have_springs_of_both_kinds_and_odd_seeds_drivers_of_both_kinds():
-    """Springs between points and of joints; drivers of angles and displacements. Even seeds have no
-    driver."""
+    """Springs of points and of joints; drivers of angles and displacements, none for even seeds."""
     scenes = list(map(random_scenes.mechanism, range(24)))
     assert {load.type for scene in scenes for load in scene.load} >= {"torsion_spring", "spring"}
     driven = {s.joint_named(driver.joint).facts.driven for s in scenes[1::2] for driver in s.driver}
@@ -35,8 +34,7 @@ def test_random_mechanisms_have_springs_of_both_kinds_and_odd_seeds_drivers_of_b
 
 
 def test_floating_mechanisms_have_no_joint_to_the_ground():
-    """The mechanism of each of five seeds has joints to the ground; the floating one has as many joints, and
-    none to the ground."""
+    """Mechanisms of five seeds have joints to the ground; the floating ones have as many, none to it."""
     for seed in range(5):
         grounded, floating = random_scenes.random_mechanism(seed), random_scenes.floating(seed)
         assert any(GROUND in joint.bodies for joint in grounded.joint)

@@ -28,6 +28,8 @@ from crosscheck.small_motions.mechanisms import (
 )
 from mbref.scene import SceneError
 from mbref.scenes import find_scene
+from tests.helpers.parts import joint
+from tests.helpers.statics import rod
 
 ROOT = Path(__file__).parents[2]
 KNOWN = {mechanism.name: mechanism for mechanism in MECHANISMS}
@@ -96,12 +98,9 @@ def test_ball_on_a_turning_spindle_has_the_roots_of_euler_s_equations():
     """A body on a ball joint with moments A, B, C turns with a spindle at Ω about its axis of C: seen from
     the spindle, s = ± i Ω and s² = -Ω² (C - A) (C - B) / (A B), to rounding."""
     rate, (a, b, c) = 6.0, (0.02, 0.03, 0.045)
-    bodies = [
-        {"name": "spindle", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.0, 0.0, 1.0]},
-        {"name": "body", "mass": 1.0, "inertia": [a, b, c], "position": [0.0] * 3},
-    ]
-    ball = {"name": "B", "type": "spherical", "bodies": ["spindle", "body"], "anchor": [0.0] * 3}
-    joints = [turning_pendulum().joint[0], ball]
+    turned = {"name": "body", "mass": 1.0, "inertia": [a, b, c], "position": [0.0] * 3}
+    joints = [turning_pendulum().joint[0], joint("B", "spherical", "spindle", "body")]
+    bodies = [rod("spindle", (0.0, 0.0, 1.0), 1.0, 0.1), turned]
     scene = turning_pendulum().with_(body=bodies, joint=joints, gravity=(0.0, 0.0, 0.0))
     found = steady_poses(scene, starts=1)[0].eigenvalues
     slow = rate * np.sqrt((c - a) * (c - b) / (a * b))
@@ -204,8 +203,7 @@ def test_steady_rotation_has_the_second_body_s_sense():
 
 
 def test_driven_axis_may_lean_from_gravity_by_1e_12_rad():
-    """The driver turns about z at 6 rad/s; gravity leans by 0.9e-12 or 1.1e-12 rad. More is no steady
-    motion."""
+    """The driver turns about z at 6 rad/s; gravity leans by 0.9e-12 or, too much, by 1.1e-12 rad."""
     allowed, refused = (turning_pendulum().with_(gravity=(k * 9.81e-12, 0.0, -9.81)) for k in (0.9, 1.1))
     assert turning(allowed).rate == 6.0
     with pytest.raises(SceneError, match="its axis is not along gravity"):

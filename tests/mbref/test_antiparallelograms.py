@@ -57,8 +57,7 @@ def test_a_driven_crossed_four_bar_stays_crossed_through_flat_positions(seed):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_swinging_crossed_four_bar_stays_crossed_and_loses_no_energy(seed):
-    """The coupler's middle is that of the pins at the crank's own angle; gravity and rigid joints lose no
-    energy."""
+    """The coupler's middle is that of the pins at the crank's angle; no energy is lost."""
     crank, frame, angle, rate = drawn(seed)
     scene = four_bar(pins(crank, frame, angle))
     spun = scene.with_(

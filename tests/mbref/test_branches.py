@@ -95,8 +95,7 @@ def test_second_branch_of_a_chain_folds_its_first_loop_and_keeps_the_energy(loop
 
 
 def test_requests_for_a_branch_or_a_crossing_that_does_not_exist_are_refused():
-    """The driven rhombus is first flat at t = π / 2 / 124.8 s, where it has one branch, and twice in 0.05
-    s."""
+    """The driven rhombus is first flat at π / 2 / 124.8 s, where it has one branch, and twice in 0.05 s."""
     with pytest.raises(ValueError, match=r"branches: the crossing at t = 0\.0125865 s has no branch 2: one"):
         simulate(four_bar(), "taylor", [0.05], Limits(branches={1: 2}))
     with pytest.raises(ValueError, match=r"branches: the motion passes 2 singular positions up to t"):

@@ -69,8 +69,7 @@ def test_velocities_of_two_bodies_that_contradict_their_joint_are_refused(count)
 
 @pytest.mark.parametrize("speed", [0.01, 2.0])
 def test_velocity_violation_is_divided_by_row_length_and_largest_velocity(speed):
-    """Body a moves at the speed u along x. The joint's row for x is (1, -1, ARM) of length 1.5, so that its
-    violation is u / 1.5 / u."""
+    """Body a moves at u along x. The joint's row for x, (1, -1, ARM), has length 1.5: u / 1.5 / u."""
     model, v = pairs(1), np.zeros(12)
     v[0], v[7] = speed, 0.1 * speed
     q = model.start().ravel()

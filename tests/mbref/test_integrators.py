@@ -190,8 +190,7 @@ def test_run_at_ten_million_radians_a_second_completes_in_2000_steps_and_meets_t
 
 
 def test_fewer_than_a_tenth_of_the_steps_of_an_accelerating_crank_are_rejected():
-    """The control of the step length is stable: it does not alternate between long, rejected steps and short
-    ones."""
+    """The control of the step length is stable: long, rejected steps and short ones do not alternate."""
     scene, times = SCENES["planar_slider_crank"](), [0.2]
     run = ran(scene, "alf-dual+projection", times, rtol=1e-7)
     assert run.cost.rejected < 0.1 * run.cost.steps, (run.cost.rejected, run.cost.steps)

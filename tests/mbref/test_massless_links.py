@@ -44,8 +44,7 @@ def test_load_of_a_gantry_with_a_massless_link_swings_on_one_slide_and_falls_on_
 
 @pytest.mark.parametrize("method", METHODS)
 def test_two_hinges_at_a_massless_link_move_as_a_universal_joint(method):
-    """Two crossing hinges form this joint; a scene with it has no massless body, and no method is special to
-    it."""
+    """Two crossing hinges form this joint, which has no massless body and needs no special method."""
     joint = Universal(name="u", bodies=("ground", "load"), anchor=CENTRE, axes=(X, Y))
     scene = Scene(name="u", gravity=(0.0, 0.0, -9.81), body=(LOAD,), joint=(joint,))
     other = simulate(scene, times=TIMES, rtol=RTOL)
@@ -84,8 +83,7 @@ def test_mass_of_zero_with_an_inertia_is_refused():
 
 
 def test_body_whose_centre_is_off_its_anchor_by_rounding_slides_at_its_speed():
-    """It slides at 1 m/s. The distance of 1e-16 m does not count as the length of the mechanism, by which
-    errors are divided."""
+    """It slides at 1 m/s. Errors are divided by the mechanism's length, which is not the 1e-16 m."""
     slide = Translational(name="x", bodies=("ground", "load"), anchor=(0.45, -0.05, -0.275), axis=X)
     load = LOAD.model_copy(update={"position": (0.45000000000000007, -0.05, -0.275), "velocity": X})
     motion = simulate(Scene(name="s", body=(load,), joint=(slide,)), times=TIMES)

@@ -115,8 +115,7 @@ def test_slightly_wrong_velocities_are_corrected_and_reported():
 
 
 def test_run_that_violates_a_joint_too_much_ends_and_names_the_joint():
-    """Without stabilisation a relative tolerance of 1e-3 lets joints drift by more than ``violation``, 1e-6
-    of the length of the mechanism."""
+    """Without stabilisation rtol 1e-3 lets joints drift by more than ``violation``, 1e-6 of the length."""
     limits = Limits(rtol=1e-3, violation=1e-6)
     trajectory = simulate(SCENES["spatial_slider_crank_driven"](), "lm1+none", [1.0], limits)
     assert trajectory.outcome.label == "VIOLATION" and "joint '" in trajectory.message, trajectory.message

@@ -48,8 +48,7 @@ def test_crank_that_starts_upright_moves_its_slider_as_the_closed_form():
 
 
 def test_missing_velocities_choose_the_branch_of_the_least_kinetic_energy():
-    """Crank and rod turn as one body about the fixed hinge, their middles on a circle of 0.154 m, and the
-    slider rests."""
+    """Crank and rod turn as one body, their middles on a circle of 0.154 m, and the slider rests."""
     times = np.linspace(0.0, 0.5, 21)
     run = simulate(upright_slider_crank(None), "taylor", times, Limits(rtol=1e-9))
     assert run.outcome.name == "COMPLETED" and "branch with the least kinetic energy" in run.message

@@ -149,8 +149,7 @@ def both(scene, stabilisation, times, formulation="alf-dual"):
 def test_sparse_and_dense_runs_have_equal_poses_rates_and_accelerations(
     name, gravity, formulation, stabilisation
 ):
-    """MPI-SVD, by dense singular values, is the truth; differences are below rtol, 1e-10, of 1 plus the
-    largest value."""
+    """MPI-SVD, by dense singular values, is the truth; differences are below 1e-10 of 1 + the largest."""
     scene = find_scene(name).with_(gravity=gravity)
     times = np.linspace(0, 0.01, 4)
     sparse, dense = both(scene, stabilisation, times, formulation)

@@ -42,8 +42,7 @@ class Plane:
 
 
 def scissor(plane: Plane, start: float) -> tuple[Scene, list]:
-    """Return two equal bars that cross in their middles, on a pin and a slider; centres as functions of
-    e^iθ."""
+    """Return two equal bars that cross in their middles, on pin and slider; centres as functions of e^iθ."""
     z = 0.6 * np.exp(1j * start)
     places = [lambda z: z / 2, lambda z: z / 2, lambda z: z.real + 0j]
     bodies = (

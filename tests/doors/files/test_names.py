@@ -53,8 +53,7 @@ def named(name: str) -> Scene:
 
 
 def test_file_names_of_different_names_differ_and_are_safe_words_of_a_shell(tmp_path):
-    """`shlex.quote` leaves safe words as they are; it would quote the letter ü, which shells do not. A plain
-    name stays."""
+    """`shlex.quote` leaves safe words and plain names as they are; it quotes ü, which shells do not."""
     found = {file_name(name) for name in NAMES}
     assert len(found) == len(NAMES) and file_name("four_bar-2") == "four_bar-2"
     for name in found:
