@@ -17,8 +17,9 @@ from crosscheck.judge.metrics import error_series
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.truth import truth_for
 from mbref.motions.trajectory import Outcome
-from mbref.scene import Body, Force, Moment, Revolute, Scene, Spherical, Spring, TorsionSpring, Universal
+from mbref.scene import Body, Force, Moment, Revolute, Scene, Spherical, TorsionSpring, Universal
 from mbref.scenes import SCENES
+from tests.helpers.parts import spring
 
 INSTALLED = pytest.mark.skipif(find_spec("newton") is None, reason="newton is not installed")
 STEP = 1e-3  # s
@@ -130,12 +131,7 @@ def pushed() -> Scene:
     loads = [
         Force(body="bob", point=(0.5, 0.2, 0.1), force=(2.0, 3.0, -1.0)),
         Moment(body="bob", moment=(0.2, -0.1, 0.3)),
-        Spring(
-            bodies=("bob", "ground"),
-            points=((0.4, 0.1, 0.1), (0.0, 0.8, 0.0)),
-            stiffness=60.0,
-            natural_length=0.3,
-        ),
+        spring("bob", (0.4, 0.1, 0.1), "ground", (0.0, 0.8, 0.0), 60.0, 0.3),
     ]
     return Scene(name="pushed", gravity=(0.5, -9.81, 2.0), duration=0.1, body=[body], load=loads)
 
@@ -149,15 +145,12 @@ def chain() -> Scene:
     ]
     joints = [
         Revolute(name="A", bodies=("ground", "a"), anchor=(0.0, 0.0, 0.0), axis=(1.0, 2.0, 3.0)),
-        Universal(
-            name="B", bodies=("b", "a"), anchor=(0.6, 0.2, 0.1), axes=((1.0, 0.0, 1.0), (1.0, 1.0, -1.0))
-        ),
+        Universal(name="B", bodies=("b", "a"), anchor=(0.6, 0.2, 0.1), axes=((1, 0, 1), (1, 1, -1))),
         Spherical(name="C", bodies=("b", "c"), anchor=(1.0, 0.2, 0.3)),
     ]
     pull = Force(body="c", point=(1.3, 0.1, 0.6), force=(2.0, 3.0, -1.0))
-    return Scene(
-        name="chain", gravity=(0.5, -9.81, 2.0), duration=0.1, body=bodies, joint=joints, load=[pull]
-    )
+    parts = {"body": bodies, "joint": joints, "load": [pull]}
+    return Scene(name="chain", gravity=(0.5, -9.81, 2.0), duration=0.1, **parts)
 
 
 @INSTALLED

@@ -20,6 +20,7 @@ POINTS = np.array([(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0,
 AXES = "yzxyzx"
 INERTIA = (1 / 600, 1.01 / 12, 1.01 / 12)  # a bar of 1 m, 0.1 m square, 1 kg
 TIMES = np.linspace(0.0, 0.6, 7)
+FINE = {"rtol": 1e-10, "min_step": 0.01}
 
 
 def bricard() -> Scene:
@@ -30,13 +31,8 @@ def bricard() -> Scene:
         Revolute(name=f"J{k}", bodies=(names[k], names[k + 1]), anchor=tuple(p), axis=tuple(unit[axis]))
         for k, (p, axis) in enumerate(zip(POINTS.tolist(), AXES, strict=True))
     ]
-    return Scene(
-        name="bricard",
-        gravity=(0.0, -9.81, 0.0),
-        duration=TIMES[-1],
-        joint=tuple(hinges),
-        body=tuple(bar(k) for k in range(5)),
-    )
+    parts = {"joint": hinges, "body": [bar(k) for k in range(5)]}
+    return Scene(name="bricard", gravity=(0.0, -9.81, 0.0), duration=TIMES[-1], **parts)
 
 
 def bar(k: int) -> Body:
@@ -44,13 +40,7 @@ def bar(k: int) -> Body:
     y = np.roll(x, 1)
     turn = rotations.from_matrix(np.column_stack([x, y, np.cross(x, y)]))
     middle = (POINTS[k] + POINTS[k + 1]) / 2
-    return Body(
-        name=f"bar{k}",
-        mass=1.0,
-        inertia=INERTIA,
-        position=tuple(middle.tolist()),
-        orientation=tuple(turn.tolist()),
-    )
+    return Body(name=f"bar{k}", mass=1.0, inertia=INERTIA, position=middle, orientation=turn)
 
 
 @functools.cache
@@ -68,13 +58,9 @@ def test_bricard_s_linkage_has_one_redundant_row_and_one_freedom():
 @pytest.mark.parametrize(
     ("name", "setting", "measured"),  # difference over the scene's length, or in rad
     [
-        (
-            "mujoco",
-            Setting("forward", {"rtol": 1e-10, "min_step": 0.01, "beta": 10.0, "hard": 1e-7}),
-            5.4e-10,
-        ),
+        ("mujoco", Setting("forward", {**FINE, "beta": 10.0, "hard": 1e-7}), 5.4e-10),
         ("pinocchio", Setting("proximal", {"step": 1e-3}), 2.7e-13),
-        ("pinocchio", Setting("tuned", {"rtol": 1e-10, "min_step": 0.01}), 4.8e-11),
+        ("pinocchio", Setting("tuned", FINE), 4.8e-11),
         ("exudyn", Setting("alpha", {"step": 1e-4}), 3e-9),
     ],
 )

@@ -12,9 +12,8 @@ from crosscheck.engines.shared.sampling import Counts, Failed, Sample, run_throu
 from crosscheck.refusals import Owner
 from mbref.motions.trajectory import Outcome
 from mbref.scene import Body, Factor, Force, Moment, Revolute, Scene, Sine
+from tests.helpers.parts import X, Z
 
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-HALF = math.sqrt(0.5)
 HINGE = Revolute(name="H", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 2.0))
 
 
@@ -26,9 +25,6 @@ def body(name: str = "b", **parts: Any) -> Body:
 
 def scene(*bodies: Body, **parts: Any) -> Scene:
     return Scene(**{"name": "s", "body": bodies or (body(),), "joint": (HINGE,), "duration": 2.0, **parts})
-
-
-# --- frames -----------------------------------------------------------------------------------------------
 
 
 # --- steps ------------------------------------------------------------------------------------------------
@@ -43,9 +39,8 @@ def test_switched_and_tabulated_loads_are_refused_for_steps_that_cannot_end_ther
     assert unended_piece(scene(load=(smooth, Moment(body="b", moment=Z)))) is None
     for load in (switched, Moment(body="b", moment=Z, factor=table)):
         found = unended_piece(scene(load=(smooth, load)))
-        assert found.owner is Owner.ADAPTER and found.reason.startswith(
-            "load[1] follows a table or is switched"
-        )
+        assert found.owner is Owner.ADAPTER
+        assert found.reason.startswith("load[1] follows a table or is switched")
 
 
 # --- samples ----------------------------------------------------------------------------------------------
@@ -69,12 +64,10 @@ def test_run_that_fails_keeps_its_samples_and_states_the_reason():
     times = np.array([0.0, 0.5, 2.0])
     found = run_through(scene(), times, advance, sampled, Counts(), 0.0, LABELS)
     assert (found.outcome, found.t_end, found.message) == (Outcome.STEP_FAILED, 0.75, "no step")
-    assert (
-        found.times.tolist() == [0.0, 0.5] and found.position.shape == (2, 1, 3) and found.reactions is None
-    )
-    lost = run_through(
-        scene(), times, lambda *_: None, lambda t: sampled(math.nan if t > 1 else t), Counts(), 0.0, LABELS
-    )
+    assert found.times.tolist() == [0.0, 0.5] and found.position.shape == (2, 1, 3)
+    assert found.reactions is None
+    lost_at_2 = lambda t: sampled(math.nan if t > 1 else t)  # noqa: E731
+    lost = run_through(scene(), times, lambda *_: None, lost_at_2, Counts(), 0.0, LABELS)
     assert (lost.outcome, lost.t_end, len(lost.times)) == (Outcome.NOT_FINITE, 0.5, 2)
     assert lost.message == "the motion is not finite at 2 s"
 

@@ -1,22 +1,20 @@
 """Formulation B of the reference, in coordinates of a spanning tree / closed forms and formulation A."""
 
-import itertools
-
 import numpy as np
 import pytest
 
+from crosscheck.conformance.mechanisms.parts import linkage
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from crosscheck.judge.reference.tree_joints import spanning_tree
 from crosscheck.judge.truth import closed_form
-from mbref.scene import Body, Driver, Revolute, Scene, TorsionSpring
+from mbref.scene import Driver, Scene, TorsionSpring
 from mbref.scenes import SCENES
 
 SECONDS = 100.0
 AGREE = 1e-15  # m: difference of two formulations over a short smooth motion
 LOST = 1e-11  # m: singular positions magnify rounding
-Z = (0.0, 0.0, 1.0)
 
 
 @pytest.mark.parametrize("name", ["four_bar", "four_bar_quarter", "four_bar_gravity"])
@@ -50,30 +48,16 @@ def test_tree_formulation_refuses_a_singular_start():
 
 
 def ring(**changes) -> Scene:
-    """Two links on each other and on the ground, each joint of which is driven or has a spring."""
-    places = ((0.0, 0.0), (0.3, 0.2), (0.7, 0.1), (0.9, 0.0))
-    bodies = [
-        Body(
-            name=f"b{k}",
-            mass=1.0,
-            inertia=(0.01, 0.01, 0.02),
-            position=((p[0] + q[0]) / 2, (p[1] + q[1]) / 2, 0.0),
-        )
-        for k, (p, q) in enumerate(itertools.pairwise(places))
-    ]
-    chain = ["ground", "b0", "b1", "b2", "ground"]
-    joints = [
-        Revolute(name=f"J{k}", bodies=(chain[k], chain[k + 1]), anchor=(*place, 0.0), axis=Z)
-        for k, place in enumerate(places)
-    ]
-    return Scene(name="ring", gravity=(0.0, -9.81, 0.0), body=bodies, joint=joints, **changes)
+    """Three bars hinged to each other and to the ground, each joint of which is driven or has a spring."""
+    places = [(0.0, 0.0, 0.0), (0.3, 0.2, 0.0), (0.7, 0.1, 0.0), (0.9, 0.0, 0.0)]
+    return linkage("ring", places).with_(**changes)
 
 
 def test_spring_of_a_joint_outside_the_tree_has_its_angle():
     """Springs act in all four joints of a ring, of which one is outside the tree. Formulation A has no tree:
     both motions are equal to rounding, and move a body by over 1 mm."""
     springs = [
-        TorsionSpring(joint=f"J{k}", stiffness=3.0 + k, damping=0.1, natural_angle=0.2) for k in range(4)
+        TorsionSpring(joint=f"P{k}", stiffness=3.0 + k, damping=0.1, natural_angle=0.2) for k in range(4)
     ]
     scene = ring(load=springs)
     assert len(spanning_tree(scene)) == 3
@@ -87,9 +71,9 @@ def test_spring_of_a_joint_outside_the_tree_has_its_angle():
 
 def test_driven_joint_is_in_the_tree():
     """Formulation B prescribes tree coordinates; its motion is formulation A's."""
-    driver = Driver(joint="J3", polynomial=(0.0, 0.5))
+    driver = Driver(joint="P3", polynomial=(0.0, 0.5))
     scene = ring(driver=(driver,))
-    assert any(link.joint is not None and link.joint.name == "J3" for link in spanning_tree(scene))
+    assert any(link.joint is not None and link.joint.name == "P3" for link in spanning_tree(scene))
     times = np.linspace(0.0, 0.2, 3)
     a, b = (move(scene, times, EXTENDED, seconds=SECONDS) for move in (natural_motion, tree_motion))
     assert not a.reason and not b.reason

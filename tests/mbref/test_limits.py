@@ -8,17 +8,8 @@ import pytest
 from mbref.cli import main
 from mbref.stepping.limits import Limits
 
-NUMBERS = (
-    "rtol",
-    "atol",
-    "rank_tolerance",
-    "violation",
-    "first_step",
-    "smallest_step",
-    "forced_step",
-    "largest_step",
-    "largest_turn",
-)
+STEPS = ("first_step", "smallest_step", "forced_step", "largest_step", "largest_turn")
+NUMBERS = ("rtol", "atol", "rank_tolerance", "violation", *STEPS)
 
 
 @pytest.mark.parametrize("value", [-1.0, math.nan, math.inf, 5e-324, 10**400, "1", True, [1.0]], ids=repr)
@@ -34,9 +25,7 @@ def test_tolerance_of_zero_and_relative_tolerance_of_one_are_refused(name, value
         Limits(**{name: value})
 
 
-@pytest.mark.parametrize(
-    "name", ["first_step", "smallest_step", "forced_step", "largest_step", "largest_turn"]
-)
+@pytest.mark.parametrize("name", STEPS)
 def test_step_limit_of_zero_which_means_no_limit_is_accepted(name):
     assert getattr(Limits(**{name: 0}), name) == 0.0
 
