@@ -23,26 +23,14 @@ from tests.fuzz.broken_files import FILES, FOLDERS
 
 DOCUMENTED = (0, 1, 2, 130)  # exit statuses
 LEFT_OUT = {"--run", "--recheck"}  # options that measure for minutes, and change files of the package
-BY_ITSELF = {
-    "draw": "svg",
-    "animate": "svg",
-    "plot": "svg",
-    "modes": "svg",
-    "import": "toml",
-}  # default outputs
+BY_ITSELF = dict.fromkeys(("draw", "animate", "plot", "modes"), "svg") | {"import": "toml"}  # outputs
 NUMBERS = (
-    *(
-        *("0", "1", "2", "3", "-1", "0.01", "1e-9", "1e-300", "1e30", "1e308", "inf", "nan", "9" * 20),
-        *("9" * 5000,),
-    ),
-    *("-0", "1_0", "٣", "0x10", "", "x", "1e", "--"),
+    *("0", "1", "2", "3", "-1", "0.01", "1e-9", "1e-300", "1e30", "1e308", "inf", "nan", "9" * 20),
+    *("9" * 5000, "-0", "1_0", "٣", "0x10", "", "x", "1e", "--"),
 )
 HOSTILE = (
-    *(
-        *("../../up", "/no/such/folder", "a/b", "$(touch pwned)", "`id`", "two words", "\x1b[31m", "\x9b2J"),
-        *("<b>", "%s"),
-    ),
-    *("{0}", "$x_1$", "-", "--", "x" * 300, "ü", "\u202e", "[red]", "a\nb", "=", ":", ",", ".."),
+    *("../../up", "/no/such/folder", "a/b", "$(touch pwned)", "`id`", "two words", "\x1b[31m", "\x9b2J"),
+    *("<b>", "%s", "{0}", "$x_1$", "-", "--", "x" * 300, "ü", "\u202e", "[red]", "a\nb", "=", ":", ",", ".."),
 )
 PLAIN = [word for word in HOSTILE if not {"/", "."} & set(word)]  # none leads to another folder
 WORDS = {  # values of an option or argument, by its name

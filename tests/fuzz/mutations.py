@@ -8,9 +8,13 @@ from typing import Any
 import tomli_w
 
 from mbref.scenes import SCENES
+from tests.helpers.parts import joint
+from tests.helpers.statics import rod
 
-AXIS = {"anchor": [0.0, 0.0, 0.0], "axis": [0.0, 1.0, 1.0]}
+AXIS = [0.0, 1.0, 1.0]
 PAIR = {"bodies": ["leaf", "bolt"]}
+FULL = [[1.0, 0.1, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1.2]]  # kg m²
+STILL = {"velocity": [0.0, 0.0, 0.0], "angular_velocity": [0.0, 0.0, 0.0]}
 
 # a scene with every kind of joint, driver and load
 EVERYTHING = {
@@ -18,43 +22,19 @@ EVERYTHING = {
     "gravity": [0.0, 0.0, -9.81],
     "duration": 0.1,
     "body": [
-        {"name": "leaf", "mass": 2.0, "inertia": [1.0, 1.0, 1.0], "position": [0.5, 0.0, 0.0]},
-        {
-            "name": "bolt",
-            "mass": 1.0,
-            "inertia": [[1.0, 0.1, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1.2]],
-            "position": [1.0, 0.0, 0.0],
-            "velocity": [0.0, 0.0, 0.0],
-            "angular_velocity": [0.0, 0.0, 0.0],
-        },
-        {"name": "ball", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "position": [1.0, 1.0, 0.0]},
-        {"name": "slide", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "position": [0.0, 1.0, 0.0]},
-        {
-            "name": "tube",
-            "mass": 1.0,
-            "inertia": [1.0, 1.0, 1.0],
-            "position": [0.0, 2.0, 0.0],
-            "orientation": [0.6, 0.8, 0.0, 0.0],
-        },
+        rod("leaf", (0.5, 0.0, 0.0), 2.0, 1.0),
+        {**rod("bolt", (1.0, 0.0, 0.0), 1.0), "inertia": FULL, **STILL},
+        rod("ball", (1.0, 1.0, 0.0), 1.0, 1.0),
+        rod("slide", (0.0, 1.0, 0.0), 1.0, 1.0),
+        {**rod("tube", (0.0, 2.0, 0.0), 1.0, 1.0), "orientation": [0.6, 0.8, 0.0, 0.0]},
     ],
     "joint": [
-        {"name": "r", "type": "revolute", "bodies": ["ground", "leaf"], **AXIS},
-        {
-            "name": "u",
-            "type": "universal",
-            **PAIR,
-            "anchor": [1.0, 0.0, 0.0],
-            "axes": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
-        },
-        {"name": "s", "type": "spherical", "bodies": ["bolt", "ball"], "anchor": [1.0, 0.5, 0.0]},
-        {"name": "t", "type": "translational", "bodies": ["ground", "slide"], **AXIS},
-        {"name": "c", "type": "cylindrical", "bodies": ["slide", "tube"], **AXIS},
-        {
-            "name": "d",
-            "type": "distance",
-            "bodies": ["ball", "slide"],
-            "anchors": [[1.0, 1.0, 0.0], [0.0, 1.0, 0.5]],
-        },
+        joint("r", "revolute", "ground", "leaf", axis=AXIS),
+        joint("u", "universal", "leaf", "bolt", (1.0, 0.0, 0.0), axes=[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+        joint("s", "spherical", "bolt", "ball", (1.0, 0.5, 0.0)),
+        joint("t", "translational", "ground", "slide", axis=AXIS),
+        joint("c", "cylindrical", "slide", "tube", axis=AXIS),
+        joint("d", "distance", "ball", "slide", anchors=[[1.0, 1.0, 0.0], [0.0, 1.0, 0.5]]),
     ],
     "driver": [
         {"joint": "r", "polynomial": [0.0, 0.5], "sine": {"amplitude": 0.1, "frequency": 2.0, "phase": 0.0}}
@@ -91,22 +71,9 @@ def strange(draw: random.Random) -> Any:
         deep = [deep]
     return draw.choice(
         [
-            draw.choice(NUMBERS),
-            draw.choice(NUMBERS),
-            draw.choice(WORDS),
-            True,
-            False,
-            [],
-            {},
-            [[]],
-            deep,
-            {"a": 1},
-            [{}],
-            [1.0, 2.0],
-            [draw.choice(NUMBERS)] * 3,
-            [[draw.choice(NUMBERS)] * 3] * 3,
-            date(2020, 1, 1),
-            [1.0, "x", 2.0],
+            *(draw.choice(NUMBERS), draw.choice(NUMBERS), draw.choice(WORDS), True, False),
+            *([], {}, [[]], deep, {"a": 1}, [{}], [1.0, 2.0], [draw.choice(NUMBERS)] * 3),
+            *([[draw.choice(NUMBERS)] * 3] * 3, date(2020, 1, 1), [1.0, "x", 2.0]),
             [draw.uniform(-2, 2) for _ in range(3)],
         ]
     )
@@ -182,31 +149,11 @@ def _smudged(draw: random.Random, text: bytes) -> bytes:
         b = min(b, a + 40)
         piece = draw.choice(
             (
-                b"",
-                b"\xef\xbb\xbf",
-                b"\xff\xfe",
-                b"\x00",
-                b"=",
-                b"[",
-                b"]" * 3,
-                b"[[",
-                b'"',
-                b"\r\n",
-                b"#",
-                b"1e9999",
-                b"1" * 5000,
-                b"0x" + b"f" * 400,
-                b"[" * 4000,
-                b"{a=" * 2000,
-                text[a:b],
-                bytes([draw.randrange(256)]),
-                b"\nname = 1\n",
-                b"\n[[body]]\n",
-                b"\n[body]\n",
-                b"1979-05-27",
-                b"'''",
-                b"\\u0000",
-                b"\\ud800",
+                *(b"", b"\xef\xbb\xbf", b"\xff\xfe", b"\x00", b"=", b"[", b"]" * 3, b"[["),
+                *(b'"', b"\r\n", b"#"),
+                *(b"1e9999", b"1" * 5000, b"0x" + b"f" * 400, b"[" * 4000, b"{a=" * 2000, text[a:b]),
+                *(bytes([draw.randrange(256)]), b"\nname = 1\n", b"\n[[body]]\n", b"\n[body]\n"),
+                *(b"1979-05-27", b"'''", b"\\u0000", b"\\ud800"),
             )
         )
         text = text[:a] + piece + text[b if draw.random() < 0.5 else a :]
