@@ -14,6 +14,7 @@ import numpy as np
 
 from crosscheck.engines.mujoco.model import COUPLING, description
 from crosscheck.engines.shared.spanning_tree import Link, Tree, spanning_tree
+from crosscheck.refusals import MOST_COUPLED
 from mbref import rotations
 from mbref.formats import Exported
 from mbref.scene import Force, JointForce, JointTorque, Moment, Scene, SceneError
@@ -23,14 +24,15 @@ KEYFRAME = "loads"  # with the control values of motors that stand for forces an
 
 
 def write(scene: Scene) -> Exported:
-    """Return the MJCF text; drivers and constant loads are reported as left out.  SceneError without
-    masses."""
+    """Return the MJCF text; drivers, constant loads and couplings of more than two joints are reported as
+    left out.  SceneError without masses."""
     if not scene.has_mass():
         raise SceneError([f"{scene.name}: MJCF needs the mass and inertia of every body"])
     if links := [body.name for body in scene.body if body.mass == 0]:
         raise SceneError([f"body {links[0]!r}: is a massless link; MuJoCo reads no moving body of mass 0"])
     kept = [load for load in scene.load if not (isinstance(load, CONSTANT) or load.over_time)]
-    bare = scene.with_(driver=(), load=kept)
+    pairs = [coupling for coupling in scene.coupling if len(coupling.joints) == MOST_COUPLED]
+    bare = scene.with_(driver=(), load=kept, coupling=pairs)
     tree = spanning_tree(bare)
     spec, pushed = description(bare, tree)
     spec.modelname = scene.name
@@ -161,6 +163,10 @@ def _true_inertia(body: Any, link: Link) -> None:
 
 
 def _left_out(scene: Scene) -> Iterator[str]:
+    for coupling in scene.coupling:
+        if len(coupling.joints) > MOST_COUPLED:
+            count = len(coupling.joints)
+            yield f"coupling {coupling.name}: an equality of MJCF relates two joints, not {count}"
     for driver in scene.driver:
         yield f"driver of {driver.joint}: MJCF prescribes no motion over time"
     for i, load in enumerate(scene.load):

@@ -10,6 +10,7 @@ from crosscheck.judge.gauss_principle import gauss, stacked
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref import Scene, SceneError
+from mbref.cli import main
 from tests.helpers.coupled_mechanisms import body
 from tests.helpers.parts import X, Y, Z, hinge, slide
 
@@ -170,6 +171,17 @@ def test_engine_that_sums_coordinates_moves_a_differential_by_its_closed_form(na
 def test_engine_that_couples_pairs_refuses_a_sum_by_name(name):
     refusal = engine(name).supports.missing(differential())
     assert "coupling 'gears' sums 3 coordinates" in str(refusal)
+
+
+def test_sum_is_left_out_of_exported_mjcf_with_a_note(tmp_path, capsys):
+    """A coupling of two joints stays."""
+    pair = {"name": "pair", "joints": ["A", "B"], "ratio": 2.0}
+    differential(coupling=[*differential().to_dict()["coupling"], pair]).save(tmp_path / "scene.toml")
+    assert main(["export", str(tmp_path / "scene.toml"), "--out", str(tmp_path / "scene.xml")]) == 0
+    assert "coupling gears: an equality of MJCF relates two joints, not 3" in " ".join(
+        capsys.readouterr().out.split()
+    )
+    assert 'name="pair"' in (tmp_path / "scene.xml").read_text()
 
 
 @pytest.mark.parametrize(
