@@ -39,13 +39,6 @@ def test_commands_name_two_drivers_of_one_slide_whose_motions_differ(power, shar
         assert "the drivers of left and right contradict each other" in shown
 
 
-def test_two_drivers_of_one_slide_that_agree_move_it():
-    """The block is at 0.5 t - t² m."""
-    run = simulate(twice_driven([0.0, 0.5, -1.0], [0.0, 0.5, -1.0]), times=[0.5, 1.0])
-    assert run.outcome.name == "COMPLETED"
-    assert np.allclose(run.position[:, 0, 0], [0.0, -0.5], atol=1e-12)
-
-
 ROWS = [(t, 0.4 * t) for t in np.linspace(0.0, 1.0, 101).tolist()]  # a table of 0.4 t m
 WAVE = {"amplitude": 1e-11, "frequency": 1e3}
 SEEN_NOWHERE = {"amplitude": 1e-7, "frequency": 200 * np.pi, "phase": np.pi / 2}  # zero at t = 0, 0.01 …
