@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,22 +41,42 @@ def random_rates(machine: Machine, size: float, number: int) -> list[Pose]:
     return [{n: float(random.uniform(-m, m)) for n, m in most.items()} for _ in range(number)]
 
 
-def accelerations_of(
-    machine: Machine, pose: Mapping[str, float], rates: Mapping[str, float], gravity: Vector
-) -> dict[str, float]:
-    """Return the accelerations (rad/s² or m/s²) of a machine that ``moves_alone``."""
+class State(NamedTuple):
+    """Displacements and rates of joints, with mass matrix (n, n) and -g - c (n,) of the machine."""
+
+    pose: Pose
+    rates: Pose
+    joints: tuple[str, ...]
+    mass: np.ndarray
+    force: np.ndarray
+
+
+def states_of(machine: Machine, poses: Sequence[Pose], size: float, gravity: Vector) -> list[State]:
+    """Return a state with random rates at each pose; none for a machine that does not move alone."""
+    if not moves_alone(machine):
+        return []
+    rates = random_rates(machine, size, len(poses))
+    return [_state(machine, pose, speed, gravity) for pose, speed in zip(poses, rates, strict=True)]
+
+
+def _state(machine: Machine, pose: Pose, rates: Pose, gravity: Vector) -> State:
     found = statics_of(machine, pose, gravity)
-    mass, v = np.array(found.mass), np.array([rates[name] for name in found.joints])
+    v = np.array([rates[name] for name in found.joints])
     slopes = [_slope(machine, pose, name) for name in found.joints]
     change = sum(rate * slope for rate, slope in zip(v, slopes, strict=True))
     force = -np.array(found.gravity) - change @ v + np.array([v @ slope @ v for slope in slopes]) / 2
-    joints = {joint.name: joint for joint in machine.joints}
-    for k, name in enumerate(found.joints):
-        joint = joints[name]
-        stretched = pose[name] + (joint.reference or 0.0) - (joint.rest or 0.0)
-        force[k] -= sum(d * v[k] * abs(v[k]) ** n for n, d in enumerate(joint.damping or ()))
+    return State(pose, rates, found.joints, np.array(found.mass), force)
+
+
+def accelerations_of(machine: Machine, state: State) -> dict[str, float]:
+    """Return the accelerations (rad/s² or m/s²) with the dampers and springs of a machine."""
+    joints, force = {joint.name: joint for joint in machine.joints}, state.force.copy()
+    for k, name in enumerate(state.joints):
+        joint, v = joints[name], state.rates[name]
+        stretched = state.pose[name] + (joint.reference or 0.0) - (joint.rest or 0.0)
+        force[k] -= sum(d * v * abs(v) ** n for n, d in enumerate(joint.damping or ()))
         force[k] -= sum(c * stretched ** (n + 1) for n, c in enumerate(joint.stiffness or ()))
-    return dict(zip(found.joints, np.linalg.solve(mass, force).tolist(), strict=True))
+    return dict(zip(state.joints, np.linalg.solve(state.mass, force).tolist(), strict=True))
 
 
 def _slope(machine: Machine, pose: Mapping[str, float], name: str) -> np.ndarray:
@@ -69,39 +89,33 @@ def _slope(machine: Machine, pose: Mapping[str, float], name: str) -> np.ndarray
 
 
 def of_dynamics(
-    match: Match,
-    own: Sequence[Mapping[str, float]],
-    poses: Sequence[Pose],
-    rates: Sequence[Pose],
-    gravity: Vector,
-    tolerance: float,
+    match: Match, own: Sequence[Mapping[str, float]], states: Sequence[State], tolerance: float
 ) -> list[Difference]:
     """Return the largest difference of accelerations, relative to the largest acceleration.
 
     If they are the accelerations without dampers or springs, or with the linear ones alone, the numbers of
     these are returned.
     """
-    states = list(zip(poses, rates, own, strict=False))
-    size, found = _worst(match.file, states, gravity)
+    size, found = _worst(match.file, own, states)
     if found is None or size <= tolerance:
         return []
     for field, (kept, words) in itertools.product(("damping", "stiffness"), enumerate(UNUSED)):
         having = [joint for joint in match.file.joints if len(getattr(joint, field) or ()) > kept]
         less: dict[str, Any] = {j.name: {field: getattr(j, field)[:kept]} for j in having}
         joints = tuple(replace(joint, **less.get(joint.name, {})) for joint in match.file.joints)
-        if having and _worst(replace(match.file, joints=joints), states, gravity)[0] <= tolerance:
+        if having and _worst(replace(match.file, joints=joints), own, states)[0] <= tolerance:
             return [Difference(WRONG, "joint", j.name, field, getattr(j, field), words) for j in having]
     return [found]
 
 
 def _worst(
-    machine: Machine, states: Sequence[tuple[Pose, Pose, Mapping[str, float]]], gravity: Vector
+    machine: Machine, own: Sequence[Mapping[str, float]], states: Sequence[State]
 ) -> tuple[float, Difference | None]:
     """Return the largest relative difference of accelerations; none if the reader lacks a joint."""
     pairs: list[tuple[str, float, float]] = []
-    for pose, rates, own in states:
-        named = {ending(name): value for name, value in own.items()}
-        expected = accelerations_of(machine, pose, rates, gravity)
+    for found, state in zip(own, states, strict=False):
+        named = {ending(name): value for name, value in found.items()}
+        expected = accelerations_of(machine, state)
         if expected.keys() - named.keys():
             return 0.0, None
         pairs += [(name, value, named[name]) for name, value in expected.items()]

@@ -13,7 +13,7 @@ from crosscheck.engines.loaders import loader
 from crosscheck.engines.loaders.loader import Built, Loader, built
 from crosscheck.engines.loaders.machine import Machine, Vector
 from crosscheck.files.differences import Difference, of_reading
-from crosscheck.files.dynamics import moves_alone, of_dynamics, random_rates
+from crosscheck.files.dynamics import State, of_dynamics, states_of
 from crosscheck.files.matching import matched
 from crosscheck.files.meaning import form_of, meant
 from crosscheck.files.merged import size_of
@@ -43,16 +43,16 @@ class Reader:
 
 @dataclass(frozen=True)
 class File:
-    """A file with its format, its meaning, and the poses, rates and gravity of statics and accelerations.
+    """A file with its format, its meaning, and the poses, states and gravity at which engines are asked.
 
-    ``rates`` are empty unless the machine is a tree of hinges and slides.
+    ``states`` are empty unless the machine is a tree of hinges and slides.
     """
 
     path: Path
     form: str
     machine: Machine
     poses: Sequence[Pose]
-    rates: Sequence[Pose]
+    states: Sequence[State]
     gravity: Vector
 
 
@@ -90,8 +90,8 @@ def file_of(path: Path) -> File:
     machine = meant(path, form)
     size = size_of(machine)
     asked = poses(machine, size)
-    speeds = random_rates(machine, size, len(asked)) if moves_alone(machine) else []
-    return File(path, form, machine, asked, speeds, machine.gravity or GRAVITY)
+    gravity = machine.gravity or GRAVITY
+    return File(path, form, machine, asked, states_of(machine, asked, size, gravity), gravity)
 
 
 def read(reader: Reader, file: File, time_limit: float) -> Reading:
@@ -103,7 +103,8 @@ def read(reader: Reader, file: File, time_limit: float) -> Reading:
 def read_in(child: Child, reader: Reader, file: File, time_limit: float) -> Reading:
     """Return the reading of a file in a child process, which has ended if the file is refused."""
     began, of_reader = time.monotonic(), loader(reader.name)
-    asked = reader.name, file.path.resolve(), file.form, file.poses, file.rates, file.gravity
+    rates = [state.rates for state in file.states]
+    asked = reader.name, file.path.resolve(), file.form, file.poses, rates, file.gravity
     try:
         seen = child.call(_built, asked, time_limit)
     except ChildFailed as failure:
@@ -130,8 +131,7 @@ def _compared(of_reader: Loader, file: File, found: Built, printed: str, seconds
     messages = (*found.machine.messages, *lines)
     differences = [*reading, *([] if explained else statics)]  # numbers of statics follow from these
     if all(difference.field in WITHOUT_MOTION for difference in differences):
-        asked = file.poses, file.rates, file.gravity
-        differences += of_dynamics(match, found.accelerations, *asked, tolerance)
+        differences += of_dynamics(match, found.accelerations, file.states, tolerance)
     machine = replace(found.machine, messages=messages)
     return Reading(
         of_reader.name,

@@ -149,14 +149,13 @@ def test_accelerations_are_mujocos_and_an_engine_without_dampers_is_named(tmp_pa
     """MuJoCo's own accelerations at four random states, with a spring and two dampers, and without these."""
     tree = '<joint name="elbow" type="hinge" axis="0 1 0" damping="0.3" stiffness="5" springref="20"/>'
     text = model(body("upper", HINGE.replace("/>", ' damping="0.2"/>') + body("lower", tree)))
-    path, gravity = written(tmp_path, text), (1.0, 2.0, -9.0)
-    file = replace(file_of(path), gravity=gravity)
-    states = file.poses, file.rates, gravity
+    text = text.replace("<worldbody>", '<option gravity="1 2 -9"/><worldbody>')
+    file = file_of(written(tmp_path, text))
     match = matched(file.machine, file.machine, DOUBLE)
     for text_of_engine, said in ((text, []), (re.sub(' damping="[^"]*"', "", text), ["elbow", "shoulder"])):
         engine = Mujoco().load(written(tmp_path, text_of_engine, "engine.xml"), MJCF)
-        own = [engine.accelerations(p, v, gravity) for p, v in zip(file.poses, file.rates, strict=True)]
-        found = of_dynamics(match, own, *states, 1e-9)  # of the largest: differences of order four
+        own = [engine.accelerations(s.pose, s.rates, file.gravity) for s in file.states]
+        found = of_dynamics(match, own, file.states, 1e-9)  # of the largest: differences of order four
         assert sorted(d.name for d in found) == said and {d.field for d in found} <= {"damping"}
 
 
