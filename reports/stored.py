@@ -60,15 +60,16 @@ def _of_known_scenes(
     """Return the records of a file by key; raises RecordsError if a record's scene has no file, or
     lacks its bodies."""
     found = read(path, shape)
-    for record in found.values():
+    present = {record["key"] for record in of_scenes(list(found.values()), list(named.values()))}
+    for key, record in found.items():
         scene, motion = named.get(record["scene"]), record.get("motion") or record
         if scene is None:
             fault = f"scene: no file of scenes/ has the name {record['scene']!r}"
-        elif of_scenes([record], [scene]) and not _fits(motion.get("bodies"), scene):
+        elif record["key"] in present and not _fits(motion.get("bodies"), scene):
             fault = "bodies: are not the bodies of the scene"
         else:
             continue
-        raise RecordsError(f"{path}: record {record['key'][:12]!r}: {fault}; restore it")
+        raise RecordsError(f"{path}: record {key[:12]!r}: {fault}; restore it")
     return found
 
 

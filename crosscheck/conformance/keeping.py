@@ -31,7 +31,7 @@ MOMENTA = ("momentum", "angular momentum")
 
 
 class Steps(NamedTuple):
-    """Settings of a family or a way, fine and coarser; one setting if the family has no other."""
+    """A fine and a coarser setting of a family or way; ``coarser`` is None if it has no other."""
 
     name: str
     fine: Setting

@@ -232,7 +232,7 @@ def _of_couplings(match: Match, tolerance: float) -> Iterator[Difference]:
 
 
 def direct(coupling: Coupling, others: Sequence[Coupling]) -> Coupling:
-    """Return a coupling to the leader that follows no other joint, if the laws between are linear."""
+    """Return the coupling of a follower to the first leader, if all laws between them are linear."""
     laws = {other.follower: other for other in others}
     for _ in others:
         outer = laws.get(coupling.leader)

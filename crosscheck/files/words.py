@@ -106,9 +106,9 @@ def verdict(reading: Reading) -> str:
     """Return the grade with its causes in one sentence."""
     if reading.grade == REFUSED:
         return f"cannot read: {reading.refusal}"
-    told = sentences(reading.differences, reading.messages)
-    more = f"; and {len(told) - SHOWN} more" if len(told) > SHOWN else ""
-    joined = "; ".join(told[:SHOWN]) + more
+    facts = sentences(reading.differences, reading.messages)
+    more = f"; and {len(facts) - SHOWN} more" if len(facts) > SHOWN else ""
+    joined = "; ".join(facts[:SHOWN]) + more
     if reading.grade == ALMOST:
         return f"the same except for: {joined}"
     return f"another machine: {joined}" if reading.grade == ANOTHER else reading.grade
