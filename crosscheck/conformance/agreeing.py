@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck.conformance.changes.copies import Outside
+from crosscheck.conformance.runners import Runner
 from crosscheck.conformance.trial import Bench, Finding, completed
 from crosscheck.engine import Alternatives
 from crosscheck.judge.connected_parts import least_constraint
@@ -78,18 +79,28 @@ def alternatives_agree(bench: Bench) -> Finding | Outside:
     return max(found, key=lambda one: one.measured / one.allowed)
 
 
+def runs_of(runner: Runner, scene: Scene, given: Alternatives) -> dict[str, Trajectory]:
+    """Return the runs, from the start to the end of a short motion, of the ways that serve the scene."""
+    times = np.array([0.0, min(scene.duration, max(SHORTEST, SHARE * scene.duration))])
+    settings = {n: s for n, s in given.ways.items() if not runner.refuses(scene, s.family)}
+    runs = runner.in_turn([(scene, setting) for setting in settings.values()], times)
+    return dict(zip(settings, runs, strict=True))
+
+
+def way_of(scene: Scene, run: Trajectory) -> Way:
+    """Return a run with its quantities; raises Broken for a run that ended early, or with numbers that are
+    not finite."""
+    whole = completed(scene, run, 2)
+    return Way(whole, quantities_of(scene, whole))
+
+
 def _ways(bench: Bench, given: Alternatives, failures: dict[str, str]) -> dict[str, Way]:
     """Return the completed ways; ways that fail and say so are left out. Raises Broken for a way that
     crashes, or claims to have completed with numbers that are not finite."""
-    scene = bench.scene
-    times = np.array([0.0, min(scene.duration, max(SHORTEST, SHARE * scene.duration))])
-    settings = {n: s for n, s in given.ways.items() if not bench.runner.refuses(scene, s.family)}
-    runs = bench.runner.in_turn([(scene, setting) for setting in settings.values()], times)
     found = {}
-    for name, run in zip(settings, runs, strict=True):
+    for name, run in runs_of(bench.runner, bench.scene, given).items():
         if run.outcome in (Outcome.COMPLETED, Outcome.CRASHED):
-            whole = completed(scene, run, len(times))
-            found[name] = Way(whole, quantities_of(scene, whole))
+            found[name] = way_of(bench.scene, run)
         else:
             failures[name] = shortened(f"{name}: {run.message or run.outcome.sentence}")
     return found
@@ -111,7 +122,7 @@ def _finding(scene: Scene, within: float, ways: Mapping[str, Way]) -> Finding:
     worst = max(differences(scene, ways, itertools.combinations(ways, 2)))
     if worst.size <= within:
         return Finding(worst.size, within, f"{' and '.join(map(repr, worst.ways))} in {worst.quantity}")
-    if off := _from_truth(scene, ways, worst.sample):
+    if off := off_from_gauss(scene, ways, worst.sample):
         right = min(off, key=lambda name: off[name])
         beside = max(differences(scene, ways, ((right, name) for name in ways if name != right)))
         worst = beside if beside.size > within else worst
@@ -148,21 +159,20 @@ def differences(scene: Scene, ways: Mapping[str, Way], pairs: Iterable[tuple[str
     return found
 
 
-def _from_truth(scene: Scene, ways: Mapping[str, Way], sample: int) -> dict[str, float]:
+def off_from_gauss(scene: Scene, ways: Mapping[str, Way], sample: int) -> dict[str, float]:
     """Return each way's distance from the accelerations by Gauss's principle at its own state, relative to
     the largest one; nothing where they are not known."""
     reporting = {name: way for name, way in ways.items() if ACCELERATION in way.quantities}
     if not scene.has_mass() or (sample and turning_loads(scene)):
         return {}
     units = np.repeat([1.0, scene_length(scene)], 3)
+    true = np.zeros(0) if sample else np.hstack(np.split(least_constraint(scene), 2))
     off = {}
     for name, (run, quantities) in reporting.items():
         if sample:
             pose = run.position[sample], run.orientation[sample]
             state = (*pose, run.velocity[sample], run.angular_velocity[sample], NO_ANGLES)
             true = units * accelerations(scene, float(run.times[sample]), state)
-        else:
-            true = np.hstack(np.split(least_constraint(scene), 2))
         scale = max(np.abs(true).max(), LEAST_CHANGE * acceleration_scale(scene))
         off[name] = float(np.abs(quantities[ACCELERATION][sample] - true).max() / scale)
     return off

@@ -45,7 +45,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["findings"],
         ["closed_loops"],
         ["convergence"],
-        ["invariants"],
+        ["invariants", "alternatives"],
         ["small_motions"],
         ["paper"],
         ["versions"],

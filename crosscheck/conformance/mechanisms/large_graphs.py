@@ -1,4 +1,4 @@
-"""Random mechanisms of 10 to 200 bodies from seeds: forests, bodies with many joints, loops that share links,
+"""Random mechanisms of up to 200 bodies from seeds: forests, bodies with many joints, loops that share links,
 loops between trees, several components, redundant closures.
 
 Joints hold at the initial poses by construction, velocities by projection. Engines are judged on them by
@@ -36,14 +36,16 @@ DRAWS = 100
 
 
 @cache
-def large_graph(seed: int) -> Scene:
+def large_graph(seed: int, fewest: int = FEWEST, most: int = MOST) -> Scene:
     """Return a mechanism with gravity, forces and moments, and velocities that its joints allow.
 
+    ``fewest`` (at least 3) and ``most`` are numbers of bodies.
     Raises RuntimeError if every draw of the seed is next to a singular position.
     """
     rng = np.random.default_rng([seed, 5])
+    name = f"graph_{seed}" if (fewest, most) == (FEWEST, MOST) else f"graph_{seed}_of_{fewest}_to_{most}"
     for _ in range(DRAWS):
-        if scene := _Drawing(rng).scene(f"graph_{seed}"):
+        if scene := _Drawing(rng, fewest, most).scene(name):
             return scene
     raise RuntimeError(f"seed {seed}: {DRAWS} draws are next to singular positions")
 
@@ -51,9 +53,9 @@ def large_graph(seed: int) -> Scene:
 class _Drawing:
     """State of the drawing of one mechanism."""
 
-    def __init__(self, rng: np.random.Generator):
+    def __init__(self, rng: np.random.Generator, fewest: int, most: int):
         self.rng = rng
-        count = round(FEWEST * (MOST / FEWEST) ** rng.random())
+        count = round(fewest * (most / fewest) ** rng.random())
         trees = int(rng.integers(1, 2 + min(4, count // 6)))
         self.tree = np.sort(rng.integers(0, trees, count))  # tree of each body
         self.axes = [self.direction() if rng.random() < PLANAR else None for _ in range(trees)]

@@ -14,6 +14,7 @@ from crosscheck.engines.loaders.machine import (
     REVOLUTE,
     SCALAR,
     TRANSLATIONAL,
+    UNLIMITED_IN_SDF,
     WORLD,
     Body,
     Coupling,
@@ -39,7 +40,6 @@ TYPES = {
     "PlanarJoint": "planar",
     "ScrewJoint": "screw",
 }
-UNLIMITED = 1e16  # rad or m; SDF writes it for an axis without limits
 INSTANT = 1e-12  # s; dampers and springs act at the end of a step
 LOOPS = {
     "WeldJointConstraint": FIXED,
@@ -141,7 +141,7 @@ class Skeletons(Loaded):
             armature=0.0,
             friction=float(joint.getCoulombFriction(0)),
             reference=0.0,
-            **limits(joint.getPositionLowerLimit(0), joint.getPositionUpperLimit(0), UNLIMITED),
+            **limits(joint.getPositionLowerLimit(0), joint.getPositionUpperLimit(0), UNLIMITED_IN_SDF),
         )
 
     def _loops(self) -> Iterator[Loop]:

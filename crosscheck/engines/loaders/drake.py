@@ -15,6 +15,7 @@ from crosscheck.engines.loaders.machine import (
     REVOLUTE,
     SCALAR,
     TRANSLATIONAL,
+    UNLIMITED_IN_SDF,
     WORLD,
     Body,
     Coupling,
@@ -40,7 +41,6 @@ TYPES = {
     "rpy_floating": "free",
 }
 STEP = 1e-3  # s, of the discrete plant: a continuous plant refuses constraints
-UNLIMITED = 1e16  # rad or m; SDF writes it for an axis without limits
 NUDGE = 0.1  # rad or m, displacement at which the force of a spring is measured
 
 
@@ -126,7 +126,7 @@ class Plant(Loaded):
             armature=sum(self._rotors(joint)),
             friction=0.0,
             reference=float(joint.default_positions()[0]),
-            **limits(joint.position_lower_limits()[0], joint.position_upper_limits()[0], UNLIMITED),
+            **limits(joint.position_lower_limits()[0], joint.position_upper_limits()[0], UNLIMITED_IN_SDF),
         )
 
     def _rotors(self, joint: Any) -> Iterator[float]:

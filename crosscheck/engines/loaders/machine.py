@@ -14,6 +14,7 @@ from typing import Any
 WORLD = "world"
 FIXED, REVOLUTE, TRANSLATIONAL = "fixed", "revolute", "translational"
 SCALAR = (REVOLUTE, TRANSLATIONAL)  # joints with one coordinate that turns or slides
+UNLIMITED_IN_SDF = 1e16  # rad or m; the limit that SDF gives an axis without limits
 Vector = tuple[float, ...]
 Matrix = tuple[Vector, ...]
 

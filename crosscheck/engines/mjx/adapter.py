@@ -13,12 +13,11 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Any
 
-from crosscheck.engine import Setting
-from crosscheck.engines.mujoco.ports import FAMILIES, OWN_STEPS, Port, PortedModel
+from crosscheck.engine import Alternatives, Setting
+from crosscheck.engines.mujoco.ports import FAMILIES, OWN_STEPS, STOCK, WAY, WAYS, Port, PortedModel
 from crosscheck.engines.shared import file_cache
 from crosscheck.engines.shared.own_steps import Steps
 from crosscheck.engines.shared.tree_reactions import LinkMotion
-from mbref.scene import Scene
 
 SINGLE = "stock, single"
 
@@ -32,13 +31,17 @@ class Mjx(Port):
     families = FAMILIES | {SINGLE: "like stock, in single precision, which is JAX's default"}
     own_steps = OWN_STEPS | {SINGLE: {}}
     compile_seconds = 300.0
+    alternatives = (
+        Alternatives(WAYS, 1e-5),
+        Alternatives({"port, double": Setting(STOCK, WAY), "port, single": Setting(SINGLE, WAY)}, 1e-2),
+    )
 
     def prepare(self, families: Sequence[str]) -> None:
         _mjx()
 
-    def world(self, scene: Scene, setting: Setting) -> Steps:
+    def in_port(self, ported: PortedModel, family: str) -> Steps:
         """Return a model of MuJoCo in JAX."""
-        return _World(PortedModel(scene, setting), setting.family == SINGLE)
+        return _World(ported, family == SINGLE)
 
 
 def _mjx(is_single: bool = False) -> Any:

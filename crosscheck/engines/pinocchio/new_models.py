@@ -12,6 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.shared.sampling import Failed
+from mbref.motions.trajectory import Outcome
+
 REDUNDANT = 1e-12  # singular value / largest singular value; smaller values belong to redundant rows
 # tolerances of ADMM and PGS, in m/s² and of the largest value, and most iterations
 SOLVED, ITERATIONS = 1e-10, 10_000
@@ -22,7 +25,7 @@ TOLERANCES = (
     "relative_complementarity_tol",
 )
 LEAST = "least squares"
-Solver = Callable[[np.ndarray, np.ndarray], np.ndarray]
+Solver = Callable[[np.ndarray, np.ndarray], np.ndarray | None]
 
 
 class NewModels:
@@ -45,10 +48,14 @@ class NewModels:
         self.datas = pin.StdVec_ConstraintData()
         self.datas.extend([constraint.createData() for constraint in self.models])
         self.forces: list[np.ndarray] = []
+        self.solver = solver
         self.solved: Solver = _least if solver == LEAST else self._by(solver)
 
-    def accelerations(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        """Return joint accelerations (nv,), and keep the forces of the closures."""
+    def accelerations(self, t: float, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
+        """Return joint accelerations (nv,), and store the forces of the closures.
+
+        Raises Failed if the solver does not converge.
+        """
         free = self.pin.aba(self.model, self.free, q, v, tau).copy()
         if not self.sizes:
             return free
@@ -56,6 +63,9 @@ class NewModels:
         mass = np.triu(mass) + np.triu(mass, 1).T
         spread = np.linalg.solve(mass, rows.T)
         pushes = self.solved(rows @ spread, rows @ free + self._bias(q, v))
+        if pushes is None:
+            words = f"Pinocchio's {self.solver} did not converge in {ITERATIONS} iterations at {t:.6g} s"
+            raise Failed(Outcome.NOT_CONVERGED, t, words)
         self.forces = np.split(-pushes, np.cumsum(self.sizes)[:-1])
         found: np.ndarray = free + spread @ pushes
         return found
@@ -83,7 +93,10 @@ class NewModels:
         return np.concatenate(found)
 
     def _by(self, name: str) -> Solver:
-        """Return ADMM or PGS as a function that solves G f + g = 0; raises ValueError for another name."""
+        """Return ADMM or PGS as a function that solves G f + g = 0, or returns None if it does not converge.
+
+        Raises ValueError for another name.
+        """
         if name not in ("ADMM", "PGS"):
             raise ValueError(f"solver {name!r}: the anchors' solvers are ADMM, PGS and {LEAST}")
         solver = getattr(self.pin, f"{name}ConstraintSolver")(sum(self.sizes))
@@ -92,12 +105,11 @@ class NewModels:
         for tolerance in TOLERANCES:
             setattr(settings, tolerance, SOLVED)
 
-        def solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+        def solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray | None:
             result = getattr(self.pin, f"{name}SolverResult")()
             delassus = self.pin.DelassusOperatorDense(matrix)
             solver.solve(delassus, right, self.models, self.datas, settings, result)
-            found: np.ndarray = result.retrieveConstraintImpulses().copy()
-            return found if result.converged else np.full_like(found, np.nan)
+            return result.retrieveConstraintImpulses().copy() if result.converged else None
 
         return solved
 

@@ -47,10 +47,7 @@ CLOSED_ENOUGH = 1e-8  # m and rad; largest residual of a result
 # rad; a driver moves by at most this in one adaptive step, since closures may change branch within larger
 # ones
 TURN_PER_STEP = 0.25
-HINTS = {
-    "defaults": ": the default solver settings fail on redundant closures",
-    **dict.fromkeys(ANCHORED, ": the solver did not converge"),
-}
+HINTS = {"defaults": ": the default solver settings fail on redundant closures"}
 
 
 class Simulation:
@@ -167,7 +164,7 @@ class Simulation:
         """Return joint accelerations (nv,) from Pinocchio."""
         tau = self.loads.constant if self.still else self.loads.torques(t, q, v)
         if self.new:
-            return self.new.accelerations(q, v, tau)
+            return self.new.accelerations(t, q, v, tau)
         solve = self.pin.lcaba if self.is_looped else self.pin.constraintDynamics
         return solve(self.model, self.data, q, v, tau, self.closures, self.closure_data, solver)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from crosscheck.engine import Setting
-from crosscheck.engines.mujoco.ports import Port, PortedModel
+from crosscheck.engine import Alternatives, Setting
+from crosscheck.engines.mujoco.ports import WAYS, Port, PortedModel
 from crosscheck.engines.shared.own_steps import Steps
 from crosscheck.engines.shared.spanning_tree import spanning_tree
 from crosscheck.engines.shared.tree_reactions import LinkMotion
@@ -21,6 +21,7 @@ class Warp(Port):
     port = "MuJoCo Warp"
     package = "mujoco-warp"
     rounding = 2.0**-23
+    alternatives = (Alternatives(WAYS, 1e-2),)
 
     def prepare(self, families: Sequence[str]) -> None:
         _warp()
@@ -41,9 +42,9 @@ class Warp(Port):
             if finer and finer.family == s.family
         ]
 
-    def world(self, scene: Scene, setting: Setting) -> Steps:
+    def in_port(self, ported: PortedModel, family: str) -> Steps:
         """Return a model of MuJoCo in Warp."""
-        return _World(PortedModel(scene, setting))
+        return _World(ported)
 
 
 def _warp() -> Any:

@@ -19,6 +19,7 @@ from crosscheck.engines.loaders.machine import (
     REVOLUTE,
     SCALAR,
     TRANSLATIONAL,
+    UNLIMITED_IN_SDF,
     WORLD,
     Body,
     Coupling,
@@ -36,7 +37,6 @@ from crosscheck.engines.sdf.frames import Frames, check_names, numbers, pose_of
 from crosscheck.engines.sdf.including import expanded
 from mbref.scene import SceneError
 
-UNLIMITED = 1e16  # rad or m, default of limits of a joint
 GRAVITY = (0.0, 0.0, -9.8)  # m/s², default of the element <gravity> of a world
 TYPES = {
     "revolute": REVOLUTE,
@@ -97,7 +97,7 @@ def _joint(joint: ET.Element, frames: Frames) -> Joint:
     if kind == "screw":
         return Joint(name, kind, pair, anchor, along, pitch=pitch(joint))
     span = (-math.inf, math.inf) if axis is None or given == "continuous" else limits_of(axis, name)
-    return Joint(name, kind, pair, anchor, along, **limits(*span, UNLIMITED), **_dynamics(axis, name))
+    return Joint(name, kind, pair, anchor, along, **limits(*span, UNLIMITED_IN_SDF), **_dynamics(axis, name))
 
 
 def _dynamics(axis: ET.Element | None, name: str) -> dict[str, Any]:

@@ -1,0 +1,1 @@
+"""Alternatives of engines on random mechanisms: differences of ways to solve the same equations."""

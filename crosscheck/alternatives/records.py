@@ -1,0 +1,155 @@
+"""Records of alternatives: how the ways of an engine end on a random mechanism, and how far they differ."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from crosscheck.conformance.agreeing import differences, off_from_gauss, runs_of, way_of
+from crosscheck.conformance.mechanisms.large_graphs import MOST, large_graph
+from crosscheck.conformance.runners import InProcess, Isolated, Runner
+from crosscheck.conformance.trial import Broken
+from crosscheck.engine import Alternatives, engine
+from crosscheck.judge.connected_parts import factored, parts
+from crosscheck.judge.constraints import initial_poses, jacobian
+from crosscheck.processes.child import ChildFailed
+from crosscheck.processes.pool import ask, end_idle
+from crosscheck.refusals import shortened
+from crosscheck.study.provenance import made_by
+from crosscheck.study.record_shape import Record, checked
+from mbref.motions.trajectory import Outcome
+from mbref.records import looked_at, rewrite
+from mbref.scene import Scene
+
+FILE = Path(__file__).parent / "records.jsonl.xz"
+GRAPHS = 300
+FEWEST, SHARED = 5, 60  # bodies of most mechanisms
+EVERY = 10  # of so many mechanisms, one has more than SHARED bodies
+TIME_LIMIT = 5.0  # s of CPU time of a way on a mechanism
+DIGITS = 3  # of stored numbers
+BATCH = 25  # mechanisms after which the file is written
+
+
+class Shape(BaseModel):
+    """Record of an engine on a mechanism.
+
+    A group has the limit ``within``, and by way: how it ``ended``, CPU ``seconds``, and how far it is ``off``
+    from Gauss's principle at the start. ``pairs`` have the worst difference, its quantity and its body.
+    """
+
+    key: str
+    engine: str
+    version: str
+    seed: int
+    scene: str
+    bodies: int
+    clearance: float
+    redundant: int
+    refused: str
+    groups: list[dict[str, Any]]
+
+
+def read(path: Path = FILE) -> list[Record]:
+    """Return the stored records. Raises RecordsError."""
+    return list(checked(path, list(looked_at(path).values()), Shape))
+
+
+def mechanism(number: int) -> Scene:
+    """Return the random mechanism of a number: of 5 to 60 bodies, every tenth one of 61 to 200."""
+    return large_graph(number, *((SHARED + 1, MOST) if number % EVERY == EVERY - 1 else (FEWEST, SHARED)))
+
+
+def measure(
+    engines: Sequence[str], path: Path = FILE, graphs: int = GRAPHS, report: Callable[[str], None] = print
+) -> None:
+    """Run the ways of engines on the mechanisms that the file lacks; ``report`` gets a line for each batch.
+
+    Records of another version of an engine are replaced.
+    """
+    versions = {name: engine(name).version() for name in engines if engine(name).alternatives}
+    known = {
+        record["key"]: record
+        for record in read(path)
+        if versions.get(record["engine"], record["version"]) == record["version"]
+    }
+    for first, name in itertools.product(range(0, graphs, BATCH), versions):
+        batch = range(first, min(first + BATCH, graphs))
+        if missing := [number for number in batch if f"{name} {number}" not in known]:
+            for number in missing:
+                known[f"{name} {number}"] = _record(name, number, known.values())
+            rewrite(path, known.values())
+            report(f"{name}: mechanisms {batch[0]} to {batch[-1]} of {graphs}")
+    end_idle()
+
+
+def _record(name: str, number: int, known: Collection[Record]) -> Record:
+    scene, asked, origin = mechanism(number), engine(name), made_by()
+    rows = jacobian(scene, 0.0, *initial_poses(scene))[0]
+    held = [factored(rows[part.rows][:, part.columns]) for part in parts(rows)]
+    own = [record for record in known if record["engine"] == name and record["bodies"] <= len(scene.body)]
+    slow = [record["scene"] for record in own if _timed_out(record)]
+    cannot = asked.cannot(scene)
+    refused = cannot.reason if cannot else f"no way completes {min(slow)}, which is smaller" if slow else ""
+    return {
+        "key": f"{name} {number}",
+        "engine": name,
+        "version": asked.version(),
+        "seed": number,
+        "scene": scene.name,
+        "bodies": len(scene.body),
+        "clearance": _rounded(min(factors.clearance for factors in held)),
+        "redundant": len(rows) - sum(factors.rank for factors in held),
+        "refused": refused,
+        "groups": [] if refused else _groups(name, scene),
+        **{part: origin[part] for part in ("commit", "date")},
+    }
+
+
+def _timed_out(record: Record) -> bool:
+    """Return whether every way of an engine has run out of time on a mechanism."""
+    ends = [end for group in record["groups"] for end in group["ended"].values()]
+    return bool(ends) and all(end.startswith(Outcome.TIMED_OUT.label) for end in ends)
+
+
+def _groups(name: str, scene: Scene) -> list[Record]:
+    """Return the result of each group of ways, made in one child process; if that child ends, in a child for
+    each way."""
+    given = engine(name).alternatives
+    limit = TIME_LIMIT + engine(name).compile_seconds
+    try:
+        return list(ask(name, groups_in_process, (scene,), limit * sum(len(each.ways) for each in given)))
+    except ChildFailed:
+        return [compared(Isolated(name, TIME_LIMIT), scene, each) for each in given]
+
+
+def groups_in_process(name: str, scene: Scene) -> list[Record]:
+    """Return the result of each group of ways of an engine, made in this process."""
+    runner = InProcess(engine(name), name, TIME_LIMIT)
+    return [compared(runner, scene, each) for each in runner.alternatives]
+
+
+def compared(runner: Runner, scene: Scene, given: Alternatives) -> Record:
+    """Return how the ways of a group ended, their CPU time (s), and the worst difference of each pair of
+    completed ways."""
+    runs, ways, ended = runs_of(runner, scene, given), {}, {}
+    for name, run in runs.items():
+        try:
+            ways[name] = way_of(scene, run)
+        except Broken as broken:
+            ended[name] = shortened(f"{run.outcome.label}: {run.message or broken}")
+    pairs = [max(differences(scene, ways, [pair])) for pair in itertools.combinations(ways, 2)]
+    return {
+        "within": given.within,
+        "ended": {name: ended.get(name, "") for name in runs},
+        "seconds": {name: _rounded(run.cost.seconds) for name, run in runs.items()},
+        "off": {name: _rounded(value) for name, value in off_from_gauss(scene, ways, 0).items()},
+        "pairs": [[*pair.ways, _rounded(pair.size), pair.quantity, pair.body] for pair in pairs],
+    }
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")
