@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from mbref.input_error import InputError
 from mbref.motions.drawing.film import MOVING, write_film
 from mbref.records import strict_json
 from mbref.rotations import to_vector
+from mbref.scene import Scene
 from mbref.scenes import find_scene
 
 if TYPE_CHECKING:
@@ -53,7 +55,8 @@ def add(commands: Any) -> None:
         "steady motion (see `mbref equilibrium`), by default about the first stable one.\n"
         "--out writes one vibration as a moving picture.",
         epilog="examples:\n  mbref modes four_bar_gravity\n"
-        "  mbref modes mechanism.toml --mode 2 --out second.svg",
+        "  mbref modes mechanism.toml --mode 2 --out second.svg\n"
+        "  mbref modes motor.toml --undriven A    # joint A turns freely",
     )
     _add_search(shake)
     shake.add_argument(
@@ -74,7 +77,25 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--number", type=whole(1, MOST_PLACE), metavar="K", help="number of the equilibrium, as listed"
     )
+    parser.add_argument(
+        "--undriven",
+        action="append",
+        metavar="JOINT",
+        default=[],
+        help="leave out the driver of this joint; may be repeated",
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+
+
+def _undriven(scene: Scene, joints: Sequence[str]) -> Scene:
+    """Return the scene without the drivers of the joints; raises InputError for a joint without a driver."""
+    driven = [driver.joint for driver in scene.driver]
+    for name in joints:
+        if name not in driven:
+            raise InputError(
+                f"--undriven: joint {name!r} has no driver; driven joints: {', '.join(driven) or 'none'}"
+            )
+    return scene.with_(driver=[driver for driver in scene.driver if driver.joint not in joints])
 
 
 def _found(options: argparse.Namespace) -> list[Equilibrium]:
@@ -82,7 +103,7 @@ def _found(options: argparse.Namespace) -> list[Equilibrium]:
     larger than theirs."""
     from mbref.design.equilibrium import equilibria
 
-    scene = find_scene(options.scene)
+    scene = _undriven(find_scene(options.scene), options.undriven)
     warn(scene)
     found = equilibria(scene, options.starts)
     if not found:

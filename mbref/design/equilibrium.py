@@ -141,7 +141,9 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
     model = Model(frame.with_armature(scene, 0.0))
     first = Tangent(model, consistent_start(model).q, frame, np.zeros(slots(model)))
     if first.freedoms == 0:
-        raise SceneError(["the mechanism has no degree of freedom, so it rests at any load"])
+        driven = " and ".join(f"driver[{driver.joint}]" for driver in scene.driver)
+        cause = f"without {driven} it can move" if driven else "it rests at any load"
+        raise SceneError([f"the mechanism has no degree of freedom: {cause}"])
     if reason := unsteady(first):
         raise SceneError([f"driver[{frame.joint}]: {reason}, so the motion is not steady"])
     freedoms = _freedoms(first)

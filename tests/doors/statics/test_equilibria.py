@@ -165,6 +165,20 @@ def test_rod_on_a_stiff_slide_along_a_pendulum_is_found_hanging():
     assert np.allclose(found.scene.body[2].position, (0.0, -depth - 0.5, 0.0), rtol=0.0, atol=1e-9)
 
 
+def test_modes_without_the_driver_of_a_pendulum_are_its_free_vibration(tmp_path, capsys):
+    """The frequency is √(m g l / J) / 2π with the moment of inertia J about the hinge."""
+    path = tmp_path / "driven.toml"
+    pendulum().with_(driver=[{"joint": "A", "polynomial": [0.0, 1.0]}]).save(path)
+    assert main(["modes", str(path), "--undriven", "A", "--json"]) == 0
+    [frequency] = json.loads(capsys.readouterr().out)["frequencies"]
+    assert frequency == pytest.approx(np.sqrt(TORQUE / ABOUT_HINGE) / (2 * np.pi), rel=1e-9)
+
+
+def test_joint_without_driver_is_refused_as_undriven(capsys):
+    assert main(["modes", "four_bar_gravity", "--undriven", "B"]) == 2
+    assert "joint 'B' has no driver; driven joints: none" in capsys.readouterr().err
+
+
 def test_pendulum_without_spring_has_one_stable_and_one_unstable_equilibrium():
     """It hangs or stands. Searches also arrive after full turns, whose poses are the same equilibria."""
     for angle in (0.3, 2.0):
