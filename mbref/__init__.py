@@ -9,8 +9,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from mbref.design.along_motion import AlongMotion, along_motion
     from mbref.design.diagnosis import Diagnosis, diagnose
     from mbref.design.equilibrium import Equilibrium, equilibria, motion_of_mode
+    from mbref.design.exchange import exchanges
+    from mbref.design.idle_freedoms import idle_freedoms
     from mbref.ensembles.ensemble import ensemble
     from mbref.equations.counts import counts
     from mbref.equations.matrices import Matrices
@@ -32,8 +35,11 @@ if TYPE_CHECKING:
 __version__ = "0.2.0"
 
 _PUBLIC = {  # module → its public names
+    "design.along_motion": ("AlongMotion", "along_motion"),
     "design.diagnosis": ("Diagnosis", "diagnose"),
     "design.equilibrium": ("Equilibrium", "equilibria", "motion_of_mode"),
+    "design.exchange": ("exchanges",),
+    "design.idle_freedoms": ("idle_freedoms",),
     "ensembles.ensemble": ("ensemble",),
     "equations.counts": ("counts",),
     "equations.matrices": ("Matrices",),
@@ -56,6 +62,7 @@ _MODULE_OF = {name: f"mbref.{module}" for module, names in _PUBLIC.items() for n
 
 __all__ = [
     "SCENES",
+    "AlongMotion",
     "Cost",
     "Diagnosis",
     "Equilibrium",
@@ -71,13 +78,16 @@ __all__ = [
     "SceneError",
     "Trajectory",
     "Variation",
+    "along_motion",
     "angles_at_start",
     "assembled",
     "counts",
     "diagnose",
     "ensemble",
     "equilibria",
+    "exchanges",
     "find_scene",
+    "idle_freedoms",
     "motion_of_mode",
     "plot",
     "simulate",

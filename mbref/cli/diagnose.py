@@ -54,7 +54,8 @@ def _diagnose(options: argparse.Namespace) -> int:
     swaps = exchanges(scene) if redundant else []
     idle = idle_freedoms(scene)
     if options.json:
-        print(strict_json(_record(scene, found, along, swaps) | {"idle_freedoms": idle}))
+        driven = {"drivers": [line.strip() for line in _driver_lines(scene)]}
+        print(strict_json(_record(scene, found, along, swaps) | {"idle_freedoms": idle} | driven))
     else:
         console().print(
             "\n".join(

@@ -90,6 +90,8 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    if options.decimal_comma and not str(options.out).endswith(".csv"):
+        raise InputError("--decimal-comma: needs --out FILE.csv, whose numbers it writes")
     write, run = _writer(options.out), request_of(options, _branches(options.branch))
     check = (
         (lambda first: _estimated(first, options.estimate).columns(*options.columns))

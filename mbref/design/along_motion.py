@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from mbref.motions.crossing import Crossing
 from mbref.motions.motion import Motion
 from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene, SceneError
+from mbref.scenes import find_scene
 from mbref.simulation.simulate import Limits, simulate
 from mbref.stepping.run import NEARLY
 
@@ -33,13 +35,30 @@ MOST_STEPS_ALONG = 20_000  # steps of the diagnosis; of a longer motion only the
 class AlongMotion:
     """Ranks and singular values of Φ_q, rows of unit length, at the poses of a motion from t = 0.
 
-    ``rank`` is the rank at most poses, ``redundant`` the number of rows minus the rank.  ``by_rounding``
-    singular values are small at every pose but not zero: rows that are redundant up to rounding in the
-    scene's numbers. ``crossings`` are the singular positions that the motion passes; ``shaky`` is true if at
-    every pose the equations of second order forbid velocities that the equations of first order allow (A.
-    Müller, Mech. Mach. Theory 2016). ``nearest`` is the least ratio of the smallest to the largest singular
-    value of a pose, at time ``nearest_time`` (s): 0 in a singular position. ``stopped`` is the reason why the
-    motion ended before the scene's duration; empty for a complete motion.
+    Attributes
+    ----------
+    end : float
+        Time of the last pose, s.
+    moves : bool
+        Whether the poses differ.
+    rank : int
+        Rank at most poses.
+    redundant : int
+        Number of rows minus the rank.
+    by_rounding : tuple of float
+        Singular values that are small at every pose but not zero: rows that are redundant up to rounding in
+        the scene's numbers.
+    nearest : float
+        Least ratio of the smallest to the largest singular value of a pose: 0 in a singular position.
+    nearest_time : float
+        Time of this pose, s.
+    crossings : tuple of Crossing
+        Singular positions that the motion passes.
+    shaky : bool
+        Whether at every pose the equations of second order forbid velocities that the equations of first
+        order allow (A. Müller, Mech. Mach. Theory 2016).
+    stopped : str
+        Why the motion ended before the scene's duration; empty for a complete motion.
     """
 
     end: float
@@ -54,11 +73,20 @@ class AlongMotion:
     stopped: str
 
 
-def along_motion(scene: Scene) -> AlongMotion:
-    """Diagnose the motion of the default method over the scene's duration.
+def along_motion(scene: Scene | str | Path) -> AlongMotion:
+    """Return ranks and singular positions along the motion by the default method over the scene's duration.
 
-    Raises SceneError if the scene cannot be simulated, or has more than 300 rows.
+    Parameters
+    ----------
+    scene : Scene, str or path
+        The mechanism, the name of a built-in one, or a .toml file.
+
+    Raises
+    ------
+    SceneError
+        If the scene cannot be simulated, or has more than 300 rows.
     """
+    scene = find_scene(scene)
     model = Model(assembled(scene))
     if model.m > MOST_ROWS_ALONG:
         raise SceneError([f"scene: {model.m} constraint rows are too many for singular values at every pose"])

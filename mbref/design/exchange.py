@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from mbref.equations.placed import placed
 from mbref.linear_algebra.least_norm import null_space
 from mbref.motions.constraints import without_armatures
 from mbref.scene import JOINT_TYPES, Joint, JointLoad, Scene
+from mbref.scenes import find_scene
 from mbref.stepping.run import NEARLY
 
 WEAKER = {  # joint type → types that allow at least its motion, beginning with most rows
@@ -34,16 +36,28 @@ REMOVED = "removed"  # stands for a joint type where a joint is removed
 Exchange = dict[str, str]  # joint → its new type, or REMOVED
 
 
-def exchanges(scene: Scene, most: int = 6) -> list[Exchange]:
+def exchanges(scene: Scene | str | Path, most: int = 6) -> list[Exchange]:
     """Return sets of joints whose exchange or removal ends all redundancy, with the same freedoms.
 
-    If at most four joints suffice, the smallest sets are returned: at most ``most`` without and ``most`` with
-    removed joints. If more joints are needed, one set is found joint by joint. The result is empty if nothing
-    is redundant or no set is found. The rank is computed at a general pose, without drivers. A joint with a
-    driver, an armature, a coupling or a torsion spring is exchanged only for a type that can have it, and is
-    not removed.
+    If at most four joints suffice, the smallest sets are returned. If more joints are needed, one set is
+    found joint by joint. The rank is computed at a general pose, without drivers. A joint with a driver, an
+    armature, a coupling or a torsion spring is exchanged only for a type that can have it, and is not
+    removed.
+
+    Parameters
+    ----------
+    scene : Scene, str or path
+        The mechanism, the name of a built-in one, or a .toml file.
+    most : int
+        Largest number of sets without removed joints, and of sets with removed joints.
+
+    Returns
+    -------
+    list of dict of str to str
+        For each set, the new type of each joint, or ``"removed"``. Empty if nothing is redundant or no set is
+        found.
     """
-    scene = assembled(scene)
+    scene = assembled(find_scene(scene))
     model = Model(without_armatures(scene).with_(driver=(), load=()))
     if not model.m:
         return []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from mbref.equations.offsets import assembled
 from mbref.linear_algebra.least_norm import null_space
 from mbref.motions.constraints import without_armatures
 from mbref.scene import Scene
+from mbref.scenes import find_scene
 
 FREE = 1e-9  # singular value of a link's columns of unit rows / largest one, below which it moves alone
 AXIAL = 1e-6  # pitch of a screw, or distance of a joint from its axis / length of the mechanism: rounding
@@ -22,12 +24,23 @@ FEWEST_JOINTS = 2  # a link with fewer joints moves alone as the last of a chain
 MOST_LINKED_ROWS = 300  # constraint rows; for more, singular values take too long
 
 
-def idle_freedoms(scene: Scene) -> list[str]:
+def idle_freedoms(scene: Scene | str | Path) -> list[str]:
     """Return a sentence for each link that can move while all other bodies stand still.
 
     The link is a body, or bodies that fixed joints weld together, with at least two other joints.  Its motion
     satisfies all rows of joints, couplings and drivers at the start and at a general pose.
+
+    Parameters
+    ----------
+    scene : Scene, str or path
+        The mechanism, the name of a built-in one, or a .toml file.
+
+    Returns
+    -------
+    list of str
+        Such as ``"rod can spin about its own axis and moves nothing else"``.
     """
+    scene = find_scene(scene)
     model = Model(without_armatures(assembled(scene)))
     if not 0 < model.m <= MOST_LINKED_ROWS:
         return []

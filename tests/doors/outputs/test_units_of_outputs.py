@@ -68,6 +68,11 @@ def test_units_that_no_output_can_have_are_refused(motion, units, message, capsy
     assert message in capsys.readouterr().err
 
 
+def test_decimal_commas_without_a_spreadsheet_to_write_are_refused(capsys):
+    assert main(["run", "four_bar", "--decimal-comma", "--columns", "energy"]) == 2
+    assert "--decimal-comma: needs --out FILE.csv" in capsys.readouterr().err
+
+
 def test_spreadsheet_with_decimal_commas_is_read_as_the_same_motion(motion, tmp_path):
     """The judge's reader takes units from the headers."""
     motion.to_csv(tmp_path / "crank.csv", units="mm,deg,kN,ms", decimal_comma=True)

@@ -2,12 +2,13 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from crosscheck.conformance.changes.units import in_other_units
 from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.judge.mobility import mobility
-from mbref import Scene, diagnose, find_scene
+from mbref import Scene, along_motion, diagnose, exchanges, find_scene
 from mbref.cli.commands import main
 from tests.helpers.statics import hinge, parallelogram, rod
 
@@ -92,6 +93,28 @@ def printed(scene: Scene, folder: Path, capsys: pytest.CaptureFixture[str]) -> s
     scene.save(folder / "scene.toml")
     assert main(["diagnose", str(folder / "scene.toml"), "--start"]) == 0
     return " ".join(capsys.readouterr().out.split())
+
+
+def test_singular_positions_along_a_motion_are_where_the_rhombus_is_flat():
+    """Four equal links at right angles at t = 0, whose crank turns at ω: flat at ω t = π/2, 3π/2, …"""
+    rate = 124.8  # rad/s
+    scene = find_scene("four_bar").with_(duration=2 * np.pi / rate)
+    assert scene.driver[0].polynomial == (0.0, -rate)
+    times = [crossing.time for crossing in along_motion(scene).crossings]
+    assert np.allclose(times, np.array([0.5, 1.5]) * np.pi / rate, rtol=1e-9, atol=0.0)
+
+
+def test_each_exchange_of_a_hinge_ends_the_redundancy_and_keeps_the_freedom_by_the_judge():
+    """A four-bar of four parallel hinges has three redundant rows."""
+    scene = parallelogram(0.7, 1.0)
+    found = exchanges(scene)
+    assert mobility(scene)[1:] == (3, 1) and {"A": "inline"} in found
+    for exchange in found:
+        joints = [
+            {**hinge.model_dump(exclude={"armature"}), "type": exchange.get(hinge.name, hinge.type)}
+            for hinge in scene.joint
+        ]
+        assert mobility(scene.with_(joint=joints))[1:] == (0, 1), exchange
 
 
 def test_rod_between_two_ball_joints_is_named_as_spinning_idly_about_its_axis(tmp_path, capsys):
