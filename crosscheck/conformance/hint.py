@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,16 @@ from crosscheck.conformance.mechanisms.specimens import Specimen
 from crosscheck.conformance.runners import Runner
 from crosscheck.conformance.trial import NEIGHBOURS, Bench, Broken, set_up
 from crosscheck.judge.constraints import initial_twists, scene_length
-from crosscheck.judge.equations_of_motion import PARTS, accelerations, terms_at, variants
+from crosscheck.judge.equations_of_motion import (
+    PARTS,
+    Scaled,
+    Terms,
+    accelerations,
+    scaled_terms,
+    terms_at,
+    variants,
+)
+from crosscheck.judge.gauss_principle import rank_of
 from crosscheck.judge.tolerances import GRAINS
 from crosscheck.processes.pool import ChildFailed
 from mbref.scene import Scene
@@ -27,6 +37,10 @@ from mbref.scene import Scene
 # conform
 WRONG = 1e-3
 EXPLAINED = 0.02  # fraction of the difference that may remain after a change that explains it
+FACTORS = {0.0: "left out", -1.0: "of opposite sign", 2.0: "counted twice"}
+NEAR_FACTOR = 0.01  # distance from one of these factors within which a factor counts as this one
+FITS = 3  # corrections of a factor; accelerations are linear in forces, and nearly so in mass
+STEP = 1e-3  # change of a factor for the difference of accelerations
 MOST = 8  # largest number of examined failing scenes; scenes that need the fewest terms come first
 WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)  # weights of central differences of order 8
 
@@ -55,9 +69,11 @@ def hint(runner: Runner, failures: Sequence[Failure], family: str = "") -> str:
     if not wrong:
         return f"{begin}; accelerations agree with the judge's, so look at the integration or at the output"
     count = Counter(change for _, changes in wrong for change in changes)
-    if not count:
+    certain = {change for _, changes in wrong for change, alone in changes.items() if alone}
+    known = [change for change in count if count[change] > 1 or change in certain]
+    if not known:
         return f"{begin}; its accelerations are wrong, and no single term explains them"
-    best = max(count, key=lambda change: (count[change], -PARTS.index(change[0])))
+    best = max(known, key=lambda change: (count[change], change in certain, -PARTS.index(change[0])))
     scenes = f"{count[best]} of {len(wrong)} scenes with wrong accelerations"
     return f"{begin}; look at the {best[0]}: {best[1]} explains {scenes}"
 
@@ -75,8 +91,9 @@ def parts_of(scene: Scene) -> list[str]:
     return [part for part in PARTS if needed[part]]
 
 
-# (part, change) pairs that explain wrong accelerations; None if the accelerations are right
-Changes = set[tuple[str, str]] | None
+# (part, change) pairs that explain wrong accelerations, of one body or load first, and whether one scene
+# proves them: where one freedom is left, a multiple of nearly every term explains all; None if none is wrong
+Changes = dict[tuple[str, str], bool] | None
 
 
 def _looked_at(runner: Runner, failure: Failure, family: str) -> Iterator[tuple[Failure, Changes]]:
@@ -96,11 +113,40 @@ def explanations(bench: Bench) -> Changes:
         raise Broken("the terms of its motion are not known")
     if difference <= WRONG * max(float(np.linalg.norm(right)), _least(scene)) + _rounded(bench):
         return None
-    return {
-        (part, change)
-        for part, change, terms in variants(scene, motion, middle)
-        if np.linalg.norm(own - accelerations(scene, terms)) <= EXPLAINED * difference
+    explains = partial(_explains, scene, own, EXPLAINED * difference)
+    found = {
+        (each.part, each.change): True for each in variants(scene, motion, middle) if explains(each.terms)
     }
+    freedoms = len(own) - rank_of(np.linalg.svd(terms_at(scene, motion, middle).rows, compute_uv=False))
+    for scaled in scaled_terms(scene, motion, middle):
+        factor = _factor(scene, scaled, own)
+        words = _words(factor)
+        if explains(scaled.times(factor)):
+            found[scaled.part, f"{scaled.name} {words}"] = freedoms > 1 or words in FACTORS.values()
+    return found
+
+
+def _explains(scene: Scene, own: np.ndarray, most: float, terms: Terms) -> bool:
+    """Return whether terms give the engine's accelerations, up to a distance."""
+    return bool(np.linalg.norm(own - accelerations(scene, terms)) <= most)
+
+
+def _factor(scene: Scene, scaled: Scaled, own: np.ndarray) -> float:
+    """Return the factor of a term whose accelerations are nearest to the engine's, by Gauss–Newton steps."""
+    factor = 1.0
+    for _ in range(FITS):
+        found = accelerations(scene, scaled.times(factor))
+        slope = (accelerations(scene, scaled.times(factor + STEP)) - found) / STEP
+        if not slope.any():
+            return factor
+        factor += float(slope @ (own - found) / (slope @ slope))
+    return factor
+
+
+def _words(factor: float) -> str:
+    """Return how a term is changed by a factor."""
+    named = (words for known, words in FACTORS.items() if abs(factor - known) < NEAR_FACTOR)
+    return next(named, f"times {factor:.3g}")
 
 
 def _differences(scene: Scene, bench: Bench) -> np.ndarray:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from crosscheck.judge.gauss_principle import of_least_constraint
 from crosscheck.judge.joint_loads import turning_loads
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import Scene
+from mbref.scene import Force, Load, Moment, Scene, Spring
 
 GYRATION = "the gyroscopic moments ω × Jω"
 GRAVITY = "gravity"
@@ -38,6 +39,15 @@ class Terms(NamedTuple):
     joints: tuple[str, ...]
     of_velocities: np.ndarray
     of_drivers: np.ndarray
+
+
+class Scaled(NamedTuple):
+    """A term of the equations of motion, the part of an engine that computes it, and the terms with a
+    multiple of it."""
+
+    part: str
+    name: str
+    times: Callable[[float], Terms]
 
 
 class Variant(NamedTuple):
@@ -79,30 +89,55 @@ def accelerations(scene: Scene, terms: Terms) -> np.ndarray:
 
 
 def variants(scene: Scene, motion: Trajectory, sample: int) -> Iterator[Variant]:
-    """Yield variants of the terms at a sample: one term is left out, has the opposite sign or is wrong. Terms
-    on which others depend come first."""
+    """Yield variants of the terms at a sample: inertias about other axes, or without a joint's rows."""
     terms = terms_at(scene, motion, sample)
     yield from _other_masses(scene, motion.orientation[sample], terms)
-    for name, force in terms.forces.items():
-        part = {GRAVITY: PARTS[1], GYRATION: PARTS[2]}.get(name, PARTS[3])
-        for change, factor in CHANGES.items():
-            yield Variant(
-                part, change.format(name), terms._replace(forces={**terms.forces, name: factor * force})
-            )
-    for change, factor in CHANGES.items():
-        changed = terms._replace(of_velocities=factor * terms.of_velocities)
-        yield Variant(PARTS[2], change.format("the velocity part of γ in J a = γ"), changed)
     for joint in dict.fromkeys(terms.joints):
         kept = np.array([name != joint for name in terms.joints])
         rows = {key: getattr(terms, key)[kept] for key in ("rows", "of_velocities", "of_drivers")}
         names = tuple(name for name in terms.joints if name != joint)
         yield Variant(PARTS[4], f"joint {joint!r} left out", terms._replace(joints=names, **rows))
-    for change, factor in CHANGES.items():
-        changed = terms._replace(of_drivers=factor * terms.of_drivers)
-        yield Variant(PARTS[5], change.format("the drivers' accelerations in γ"), changed)
 
 
-CHANGES = {"{} left out": 0.0, "{} of opposite sign": -1.0, "{} counted twice": 2.0}
+def scaled_terms(scene: Scene, motion: Trajectory, sample: int) -> Iterator[Scaled]:
+    """Yield each term at a sample for multiples of it: forces, parts of γ, and mass and inertia of a body,
+    with the gravity and gyroscopic moment that they cause."""
+    terms = terms_at(scene, motion, sample)
+    for name in terms.forces:
+        part = {GRAVITY: PARTS[1], GYRATION: PARTS[2]}.get(name, PARTS[3])
+        yield Scaled(part, name, partial(_with_forces, terms, {name}))
+    for kind in dict.fromkeys(load.type for load in scene.load):
+        names = {_name(k, load) for k, load in enumerate(scene.load) if load.type == kind}
+        yield Scaled(PARTS[3], f"every {kind}", partial(_with_forces, terms, names))
+    for part, name, field in (
+        (PARTS[2], "the velocity part of γ in J a = γ", "of_velocities"),
+        (PARTS[5], "the drivers' accelerations in γ", "of_drivers"),
+    ):
+        yield Scaled(part, name, partial(_with_multiple, terms, field))
+    places = [(f"body {body.name!r}", slice(b, b + 1)) for b, body in enumerate(scene.body)]
+    for whose, bodies in [*places, ("every body", slice(None))]:
+        for name, half, force in (("mass", slice(0, 3), GRAVITY), ("inertia", slice(3, 6), GYRATION)):
+            chosen = np.zeros((len(scene.body), 6), dtype=bool)
+            chosen[bodies, half] = True
+            yield Scaled(
+                PARTS[0], f"the {name} of {whose}", partial(_with_inertia, terms, chosen.ravel(), force)
+            )
+
+
+def _with_forces(terms: Terms, names: Collection[str], factor: float) -> Terms:
+    multiples = {name: factor * terms.forces[name] for name in names}
+    return terms._replace(forces={**terms.forces, **multiples})
+
+
+def _with_multiple(terms: Terms, field: str, factor: float) -> Terms:
+    return terms._replace(**{field: factor * getattr(terms, field)})
+
+
+def _with_inertia(terms: Terms, chosen: np.ndarray, name: str, factor: float) -> Terms:
+    """Return the terms with a multiple of chosen rows of the mass matrix and of a force that it causes."""
+    multiple = np.where(chosen, factor, 1.0)
+    forces = {**terms.forces, name: multiple * terms.forces[name]}
+    return terms._replace(mass=multiple[:, None] * terms.mass, forces=forces)
 
 
 def _state(scene: Scene, motion: Trajectory, sample: int) -> State:
@@ -140,7 +175,7 @@ def _forces(scene: Scene, t: float, state: State) -> dict[str, np.ndarray]:
         angles = state[4][springs : springs + turns]
         springs += turns
         own = (*state[:4], angles)
-        name = f"load[{k}] ({load.type})"
+        name = _name(k, load)
         force = applied(bare.with_(load=[load]), t, own).ravel() - gyroscopic
         if load.is_damped:
             undamped = load.model_copy(update={"damping": 0.0})
@@ -148,6 +183,14 @@ def _forces(scene: Scene, t: float, state: State) -> dict[str, np.ndarray]:
             found[f"the damping of {name}"], force = force - elastic, elastic
         found[name] = force
     return found
+
+
+def _name(place: int, load: Load) -> str:
+    """Return the name of a load, such as ``load[0] (moment on 'rod')``."""
+    if isinstance(load, Spring):
+        return f"load[{place}] (spring between {' and '.join(map(repr, load.bodies))})"
+    where = f"on {load.body!r}" if isinstance(load, Moment | Force) else f"at {load.joint!r}"
+    return f"load[{place}] ({load.type} {where})"
 
 
 def _mass(scene: Scene, orientation: np.ndarray, inertia: np.ndarray | None = None) -> np.ndarray:

@@ -23,16 +23,23 @@ NAMES = ("tumbling body", "pendulum", "spinning loop", "cylindrical driver", "to
 
 
 class Defective(example.Mechanism):
-    """Equations of the example engine with one defect: no gravity, +ω × Jω, γ without velocities, or the
-    driver's acceleration of opposite sign."""
+    """Equations of the example engine with one defect: no gravity or 2 % more, +ω × Jω, γ without velocities,
+    the driver's acceleration or a moment of opposite sign, or the last body's inertia 1 % larger."""
 
     defect = ""
 
     def __init__(self, scene):
-        super().__init__(scene.with_(gravity=(0.0, 0.0, 0.0)) if self.defect == "gravity" else scene)
+        factor = {"gravity": 0.0, "gravity of 102 %": 1.02}.get(self.defect, 1.0)
+        super().__init__(scene.with_(gravity=tuple(factor * g for g in scene.gravity)))
+        if self.defect == "inertia of 101 %":
+            self.inertia[-1] *= 1.01
 
     def loads(self, state):
         force, moment = super().loads(state)
+        if self.defect == "moment":
+            for load in self.scene.load:
+                if load.type == "moment":
+                    moment[self.scene.body_index(load.body)] -= 2 * np.array(load.moment)
         if self.defect == "gyroscopic":
             for b in range(self.count):
                 inertia = state.turn[b] @ self.inertia[b] @ state.turn[b].T
@@ -64,6 +71,21 @@ def runner_with(defect, monkeypatch):
             "driver",
             ("driven", "cylindrical driver"),
             "look at the drivers: the drivers' accelerations in γ of opposite",
+        ),
+        (
+            "gravity of 102 %",
+            ("free_fall", "revolute joint"),
+            "look at the gravity: gravity times 1.02 explains",
+        ),
+        (
+            "moment",
+            ("moment load", "pushed body"),
+            "look at the loads: every moment of opposite sign explains 2 of 2",
+        ),
+        (
+            "inertia of 101 %",
+            ("several springs",),
+            "look at the mass matrix: the inertia of body 'body' times 1.01",
         ),
     ],
 )
