@@ -133,8 +133,8 @@ def test_polynomials_mbref_and_judge_have_equal_constraints_of_random_joints(
 
 @pytest.mark.parametrize("name", ["every_joint", "driven", "five_bar", "spatial_slider_crank_driven"])
 def test_derivatives_of_constraint_polynomials_are_difference_quotients(name: str) -> None:
-    """Φ' and Φ'' are central differences of Φ and Φ' over 2e-6 s, along a motion with constant v and
-    body-fixed ω. The limit is MARGIN times the measured difference QUOTIENT."""
+    """Φ' and Φ'' are central differences of Φ and Φ' over 2 h, along a motion with constant v and body-fixed
+    ω. The difference, over 1 + the largest derivative, is at most MARGIN times the measured QUOTIENT."""
     scene, h = MECHANISMS[name], 1e-6
     s = Consistent(scene, 0.002, 7, 0.02)
     c = Constraints(scene)

@@ -44,7 +44,8 @@ def test_an_error_at_the_bound_of_the_truth_shows_no_order(power: float) -> None
 
 
 def test_cell_shows_the_least_error_and_the_order() -> None:
-    """An arrow: the finest step has the least error. Signs: ! no run completes, – refused, ○ no record."""
+    """An arrow: the finest step has the least error. "<1e-14": the least error is below the bound of the
+    truth. Signs: ! no run completes, – refused, ○ no record."""
     assert cell(runs(4.0, 3e-12)) == "3e-12 (4.0)"
     assert cell(runs(1.0, 0.0, 6)) == "3e-03 ↓ (1.0)"
     assert cell([*runs(4.0, 0.0, 8), run(1e-4, 2e-15)]) == "<1e-14 (4.0)"

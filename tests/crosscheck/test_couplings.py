@@ -72,8 +72,8 @@ def test_armatures_count_in_the_start_velocities_of_least_kinetic_energy():
     assert np.abs(mbref.simulate(scene, times=[0.0]).velocity[0] - doubles(exact.velocity[0])).max() < APART
 
 
-def lacks(name, make):
-    """Return whether a scene has parts, couplings or armatures, that an engine lacks."""
+def needs_what_is_missing(name, make):
+    """Return whether a scene has couplings or armatures, and the engine lacks them (LACKS)."""
     scene = make()
     parts = {"coupling": bool(scene.coupling), "armature": any(j.reflected_inertia for j in scene.joint)}
     return name in LACKS and parts[LACKS[name]]
@@ -84,15 +84,16 @@ PAIRS = [
 ]
 
 
-@pytest.mark.parametrize(("name", "make"), [pair for pair in PAIRS if lacks(*pair.values)])
-def test_engines_without_couplings_or_armatures_refuse_them_by_the_kind(name, make):
-    """Simbody lacks armatures and Pinocchio couplings."""
+@pytest.mark.parametrize(("name", "make"), [pair for pair in PAIRS if needs_what_is_missing(*pair.values)])
+def test_refusal_of_an_engine_names_the_coupling_or_armature_that_it_lacks(name, make):
+    """LACKS names what each engine lacks. Its adapter refuses scenes with such parts on the engine's
+    behalf."""
     pytest.importorskip(MODULES[name])
     refusal = engine(name).cannot(make())
     assert refusal is not None and refusal.owner is Owner.ENGINE and LACKS[name] in refusal.reason
 
 
-@pytest.mark.parametrize(("name", "make"), [pair for pair in PAIRS if not lacks(*pair.values)])
+@pytest.mark.parametrize(("name", "make"), [p for p in PAIRS if not needs_what_is_missing(*p.values)])
 def test_engines_move_coupled_joints_as_the_reference(name, make):
     """Errors of the states against the judge's truth stay below ENGINES. Reactions differ from the truth by
     less than 1e-6 of the largest reaction."""
@@ -120,7 +121,7 @@ def test_bullet_refuses_an_armature_by_its_joint():
     assert refusal.owner is Owner.ENGINE and "joint 'A' has an armature" in refusal.reason
 
 
-@pytest.mark.parametrize("make", [make for make in EVERY if not lacks("bullet", make)])
+@pytest.mark.parametrize("make", [make for make in EVERY if not needs_what_is_missing("bullet", make)])
 def test_bullet_moves_coupled_joints_to_first_order(make):
     """Half the step gives half the error against the judge's truth, and joints stay closed."""
     pytest.importorskip("pybullet")

@@ -36,8 +36,9 @@ LAW = Driver(
 
 
 @pytest.mark.parametrize("derivative", range(5))
-def test_derivatives_of_a_polynomial_with_a_sine_are_those_of_calculus(derivative):
-    """The k-th derivative of a sin(w t + p) is a wᵏ sin(w t + p + k π/2)."""
+def test_derivatives_of_a_polynomial_with_a_sine_equal_their_formulas(derivative):
+    """NumPy's derivative of the polynomial; the k-th derivative of a sin(w t + p) is a wᵏ sin(w t + p + k
+    π/2)."""
     t = np.array([0.0, 0.4, 1.1])
     smooth = np.polynomial.Polynomial((-0.2 * math.sin(0.7), 0.5, -0.3, 0.2))
     wave = 0.2 * 3.0**derivative * np.sin(3.0 * t + 0.7 + derivative * math.pi / 2)
@@ -205,7 +206,8 @@ def pendulum() -> Scene:
 
 
 def test_terms_of_a_pendulum_are_its_forces_mass_and_constraint_rows():
-    """At the start: 2 kg at 1 m, 2.5 kg m² about the hinge; moments -18 + 1.5 + 0.3 - 1.0 N m."""
+    """At the start: 2 kg at 1 m, 2.5 kg m² about the hinge; moments -18 + 1.5 + 0.3 - 1.0 N m. At 0.05 s the
+    spring's moment is -3 N m/rad (φ - 0.1), and accelerations are the motion's own."""
     scene = pendulum()
     motion = gauss_motion(scene, (0.0, 0.05))
     terms = terms_at(scene, motion, 0)

@@ -61,7 +61,8 @@ def test_short_runs_that_compare_models_compile_no_code():
 
 
 @pytest.mark.parametrize("scene", ["free_fall", pytest.param("pendulum", marks=pytest.mark.slow)])
-def test_plug_in_conforms_and_refuses_a_spatial_mechanism(installed, capsys, scene):
+def test_verify_passes_the_tiny_plug_in_and_lists_the_spatial_scene_that_it_refuses(installed, capsys, scene):
+    """Exit status 0: no check of the example engine, which is planar, fails."""
     assert main(["verify", "tiny", "--scene", scene, "--scene", "spatial_slider_crank"]) == 0
     out = capsys.readouterr().out
     assert "0 fail" in out and "cannot: spatial_slider_crank" in out, out

@@ -79,7 +79,8 @@ def test_mbref_moves_an_inline_joint_as_the_reference(scene, method):
 
 @each
 def test_mujoco_moves_an_inline_joint_as_the_reference(scene):
-    """By its family `projected` at the finest setting."""
+    """By its family `projected` at the finest setting; ENGINES has the allowed error, of the scene's length
+    or rad."""
     found = engine("mujoco")
     run = found.run(scene, TIMES, found.settings_of(scene, "projected")[-1])
     errors = measure(scene, run, truth_for(scene))
@@ -88,7 +89,8 @@ def test_mujoco_moves_an_inline_joint_as_the_reference(scene):
 
 @each
 def test_exudyn_moves_an_inline_joint_as_the_reference(scene):
-    """By its best family at the finest setting."""
+    """By its best family at the finest setting; ENGINES has the allowed error, of the scene's length or
+    rad."""
     found = engine("exudyn")
     assert found.cannot(scene) is None
     errors = measure(scene, found.run(scene, TIMES, found.best_settings(scene)[-1]), truth_for(scene))

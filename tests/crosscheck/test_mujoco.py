@@ -68,14 +68,10 @@ def test_mujoco_s_steps_divide_intervals_evenly_and_are_counted(family: str, eva
     assert (cost.steps, cost.rhs) == (6, 6 * evaluations)
 
 
-def test_implicitfast_is_offered_with_damping_only_and_moves_as_euler_without() -> None:
-    """Without damping both integrate alike: the slider-crank's motions differ by rounding, 3e-14 measured."""
-    scene = SCENES["spatial_slider_crank"]()
-    assert "implicitfast" not in {s.family for s in engine("mujoco").settings(scene)}
-    assert "implicitfast" in {s.family for s in engine("mujoco").settings(every_joint())}
-    fast, euler = (simulate(scene, 0.02, family, step=1.4e-6) for family in ("implicitfast", "euler"))
-    apart = max(abs(fast.position - euler.position).max(), abs(fast.orientation - euler.orientation).max())
-    assert apart < MARGIN * 3e-14, f"apart by {apart:.1e}"
+def test_implicitfast_is_offered_for_scenes_with_damping_alone() -> None:
+    """Without damping it takes the steps of Euler's method. The scene of every joint has a damper."""
+    assert "implicitfast" not in {s.family for s in ENGINE.settings(SCENES["spatial_slider_crank"]())}
+    assert "implicitfast" in {s.family for s in ENGINE.settings(every_joint())}
 
 
 @pytest.mark.parametrize("name", FORWARD)
@@ -96,7 +92,8 @@ def test_hardened_closures_are_closer_to_the_truth_than_stock_and_defaults() -> 
 
 
 def test_error_of_tuned_mujoco_falls_with_the_fourth_power_of_the_step() -> None:
-    """RK4 with hard closures, whose softness has no part in the error; by the truth of the driven motion."""
+    """RK4 with hard closures, whose softness has no part in the error; by the truth of the driven motion.
+    Steps as long as these also show terms of other orders, so that 3.5 to 5 is allowed."""
     scene = SCENES["spatial_slider_crank_driven"]()
     steps = (2e-4, 1e-4)
     errors = [

@@ -47,7 +47,8 @@ REFUSED = [pytest.param(*case, id=f"{case[0].name}-{case[1]}") for case in ROWS 
 
 @pytest.mark.parametrize(("formulation", "redundant"), REFUSED)
 def test_formulation_reports_a_system_that_it_does_not_claim_to_solve_as_singular(formulation, redundant):
-    """It needs independent rows, or independent columns; 12 rows of 18 columns have dependent columns."""
+    """Systems of 12 rows and 18 columns have dependent columns, and redundant rows where the id says so.
+    REFUSED has each formulation with the numbers of redundant rows that its claims exclude."""
     status, _, _ = solve(formulation, *system(12, 18, redundant)[:4])
     assert status == SINGULAR
 

@@ -33,7 +33,9 @@ def difference(matrix: np.ndarray, rhs: np.ndarray) -> float:
 
 @pytest.mark.parametrize(("rows", "columns", "rank"), [(6, 6, 6), (8, 12, 5), (24, 18, 18), (3, 6, 1)])
 @pytest.mark.parametrize("seed", range(5))
-def test_solution_and_null_space_equal_those_of_the_pseudo_inverse_for_every_rank(seed, rows, columns, rank):
+def test_least_norm_solution_and_null_space_are_given_by_the_pseudo_inverse(seed, rows, columns, rank):
+    """The function ``least_norm_and_null_space`` against NumPy's pseudo-inverse A⁺: A⁺ b and I - A⁺ A, for
+    matrices with full and with deficient rank."""
     matrix = unit_rows(seed, rows, columns, [1.0] * rank)
     assert difference(matrix, matrix @ np.random.default_rng(seed).normal(size=columns)) < ROUNDING
 

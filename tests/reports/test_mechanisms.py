@@ -60,7 +60,7 @@ def test_still_picture_shows_the_largest_difference_of_a_run():
     assert len(middle) == 2 and set(middle) <= set(drawn), (middle, drawn)
 
 
-def test_frames_of_a_planar_crank_are_less_than_two_turn_steps_apart():
+def test_crank_turns_by_less_than_two_thirds_of_a_radian_between_drawn_frames():
     """Frames are chosen so that a body turns by about TURN rad between them."""
     planar = SCENES["planar_slider_crank"]().with_(duration=0.05)
     true = mechanisms.motion_of(planar, truth_record(planar, np.linspace(0, 0.05, 3), 20.0)["motion"])

@@ -193,8 +193,9 @@ def test_incomplete_sweep_is_shown_as_far_as_it_got(records):
     assert {row[last_draw] for row in cells(drawn) if row["Method"] not in runs.LASTING} == {"0.2000 c"}
 
 
-def test_exact_crank_record_follows_the_true_branch(records):
-    """It never leaves the true motion ("–"), crosses 61 singular positions (θ = 61.0 π), at the true rate."""
+def test_table_of_cranks_shows_that_an_exact_record_never_leaves_the_true_motion(records):
+    """The section's table of the record of an exact crank: "–" is never off the true motion; 61 singular
+    positions are crossed up to θ = 61 π, and rates equal the true ones."""
     [found] = [b for b in paper_cranks.render(records) if isinstance(b, Table)]
     [off] = [name for name in found.header if name.startswith("Off by")]
     assert {row[off] for row in cells(found)} == {"–"}

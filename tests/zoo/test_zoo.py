@@ -60,7 +60,7 @@ def test_a_law_that_a_defect_breaks_fails_on_one_body_too(check, scene):
 
 
 def test_every_check_has_a_defect_that_it_detects():
-    """Of the table: the test above shows that the check detects it."""
+    """The table of defects names each check of the suite. The first test of this file shows the detection."""
     idle = {*suite.FIRST, *PROPERTIES} - {defect.check for defect in DEFECTS.values()}
     assert not idle, f"no defect of the zoo trips {sorted(idle)}"
 

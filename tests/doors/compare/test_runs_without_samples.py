@@ -70,9 +70,11 @@ def test_command_prints_that_no_run_of_a_crashing_engine_completed(
 
 
 def test_json_of_run_has_the_outcome_of_an_engine_that_crashed(tmp_path: Path, capsys):
+    """The engine raises an error before its first sample."""
     (run,) = json.loads(printed(capsys, tmp_path, "run", "--json"))["records"]
     assert (run["outcome"], run["times"]) == ("CRASHED", [])
 
 
 def test_json_of_tune_has_no_setting_of_an_engine_that_crashed(tmp_path: Path, capsys):
+    """The engine raises an error in each run, so that tuning finds no setting."""
     assert json.loads(printed(capsys, tmp_path, "tune", "--json"))["records"] == []

@@ -139,8 +139,9 @@ def hanging(limit: str, kind: str = "revolute") -> str:
         ("<lower>-1e16</lower><upper>1e16</upper>", "prismatic"),
     ],
 )
-def test_a_limit_that_the_motion_leaves_at_the_start_is_left_out_with_a_remark(files, limit, kind):
-    """Joints start at 0. A body falls to larger angles or smaller displacements; ±1e16 is no limit in SDF."""
+def test_a_limit_that_does_not_act_at_the_start_is_left_out_with_a_remark(files, limit, kind):
+    """Joints start at 0, and the body falls to larger angles or smaller displacements, away from a limit at
+    0. Infinite limits and ±1e16, SDF's default, never act."""
     assert "1 limit of a joint" in files.scene(hanging(limit, kind), "a.sdf")[1]
 
 

@@ -114,12 +114,13 @@ def test_driven_shafts_of_a_differential_turn_its_cage_by_the_mean():
 
 
 def test_offset_of_a_sum_is_met_by_the_least_displacement():
-    """Least Σ I φ² with φ_A + φ_B - 2 φ_C = 0.03: φ = ratio / I times one number."""
+    """Least Σ I φ² with φ_A + φ_B - 2 φ_C = 0.03: φ = ratio / I times one number. Finite steps find it, each
+    the least one; their sum is within 0.5 % of the least displacement."""
     scene = differential(load=[]).with_("coupling[gears].offset", "0.03 rad")
     motion = mbref.simulate(scene, times=[0.0, 1.0])
     found = np.array([motion.joint(n).angle[0] for n in "ABC"])
     assert found @ RATIOS == pytest.approx(0.03, abs=1e-12)
-    assert found == pytest.approx(0.03 * RATIOS / INERTIAS / (RATIOS**2 / INERTIAS).sum(), rel=5e-3)
+    assert found == pytest.approx(0.03 * RATIOS / INERTIAS / (RATIOS**2 / INERTIAS).sum(), rel=0.005)
 
 
 def test_two_joints_with_ratios_move_as_with_their_ratio():

@@ -19,7 +19,7 @@ def numbers(motion):
 
 @pytest.mark.parametrize("name", ["spatial_slider_crank_gravity", "four_bar_gravity"])
 def test_second_run_of_a_scene_is_equal_to_the_bit(name):
-    """So is the run of a renamed copy, without anything that the first run kept of the scene."""
+    """The run of a renamed copy is equal, too: a scene carries no data from its first run to the second."""
     scene = find_scene(name)
     first, again = (numbers(simulate(scene, "taylor", TIMES)) for _ in range(2))
     fresh = numbers(simulate(scene.with_(name="copy"), "taylor", TIMES))
