@@ -221,7 +221,8 @@ def test_an_unknown_method_is_refused_with_the_known_ones(capsys, still):
 
 @pytest.mark.parametrize("what", ["scenes", "engines", "methods", "settings", "metrics"])
 def test_list_names_every_scene_engine_method_setting_and_metric(capsys, what):
-    """The settings are those of MuJoCo, Pinocchio and Exudyn: one family of each is named."""
+    """The known names are the registries of the packages; of settings, one family each of MuJoCo, Pinocchio
+    and Exudyn."""
     from crosscheck.engine import engine_names
     from crosscheck.judge.metrics import METRICS
     from mbref.formulations import FORMULATIONS

@@ -299,6 +299,8 @@ def test_newton_ends_where_closures_cannot_be_met() -> None:
 
 
 def test_newton_refuses_a_scene_whose_motion_is_not_prescribed() -> None:
+    """NEWTON is the family that solves joints and drivers by Newton's method, which needs a driver for each
+    freedom."""
     pytest.importorskip("mujoco")
     with pytest.raises(ValueError, match="do not prescribe the whole motion"):
         simulate("mujoco", SCENES["planar_slider_crank"](), 5, NEWTON, tolerance=1e-10, turn=0.1)

@@ -41,6 +41,7 @@ def test_new_names_begin_with_letters_that_fall_from_z_to_a_and_begin_again():
 
 
 def test_a_body_is_not_split_if_a_name_is_taken_or_a_half_is_too_thin():
+    """Another body has the name "b half". Half of the thin body would have a moment below SMALLEST, kg m²."""
     taken = rewritings.split(scene(body("b half", position=ORIGIN), body()))
     assert isinstance(taken, Outside) and taken.reason.startswith("the halves are not valid bodies: ")
     assert "b half" in taken.reason

@@ -112,7 +112,7 @@ def test_file_with_an_unsupported_element_is_refused_with_the_element_s_name(nam
 
 @pytest.mark.parametrize("name", [n for n in READ if n.endswith(".urdf") and "mimic" not in n])
 def test_pinocchio_builds_the_machine_of_the_urdf(name):
-    """Bodies, joints and couplings, and the mass matrix and weight at four poses, are those of the file."""
+    """Bodies, joints and couplings, and the mass matrix and weight at four poses, equal the file's."""
     pytest.importorskip("pinocchio")
     file = file_of(KINDS / name)
     found = built(Pinocchio(), file.path, file.form, file.poses, (), file.gravity)

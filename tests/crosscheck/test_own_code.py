@@ -30,7 +30,8 @@ MODEL = (
     ],
 )
 def test_shown_mjcf_and_python_set_the_options_of_a_mujoco_run(family, options):
-    """A model with the shown XML and Python has the options, softness and regularisers of the adapter's."""
+    """A model with the shown XML and Python has the options, softness and regularisers of the adapter's
+    model."""
     mujoco = pytest.importorskip("mujoco")
     from crosscheck.engines.mujoco.simulation import Simulation
 

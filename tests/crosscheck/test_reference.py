@@ -87,8 +87,8 @@ def test_bound_of_a_mechanism_far_from_the_origin_holds_the_rounding_of_its_samp
     ],
 )
 def test_reference_is_within_its_bound_of_a_known_motion(name):
-    """The error is that of the closed form. The bound is at most SMOOTH, except for motions over singular
-    positions (SINGULAR), which magnify rounding."""
+    """The error is the difference from the closed form. The bound is at most SMOOTH, except for motions over
+    singular positions (SINGULAR), which magnify rounding."""
     scene = ALL[name]
     found, reason = samples(scene, BRIEF.get(name, scene.duration))
     truth = closed_form(scene)
@@ -272,12 +272,13 @@ TABLES = {path.stem: path for path in (Path(cache.__file__).parent / "certified"
 
 
 def test_every_scene_except_the_singular_start_has_a_certified_table():
-    """So do 20 random mechanisms."""
+    """TABLES are the files of the package; 20 random mechanisms have one, too."""
     assert set(TABLES) == set(SCENES) - {*SINGULAR_START} | {f"random_{seed}" for seed in SEEDS}
 
 
 def test_certified_tables_are_unedited_and_bounded_by_1e_20():
-    """The hash in a table is that of its numbers; a table of a later version names the one it supersedes."""
+    """The hash in a table equals the digest of its numbers; a table of a later version names the table that
+    it supersedes."""
     for path in TABLES.values():
         table = json.loads(path.read_text())
         assert table["hash"] == digest(table), f"{path.name} was edited"

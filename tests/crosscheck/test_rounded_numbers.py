@@ -58,10 +58,10 @@ def test_rounded_loop_is_closed_and_keeps_its_redundant_rows(name, digits):
     redundant rows are those without rounding, and singular values beyond the rank are rounding."""
     scene, whole = turned(name, digits), turned(name, None)
     gaps = closure(scene, np.zeros(1), *(a[None] for a in initial_poses(scene)))
-    assert max(np.abs(rows).max() for rows in gaps.values()) < 1e-14
+    assert max(np.abs(rows).max() for rows in gaps.values()) < 1e-14  # m, rad: 50 roundings of 1
     assert (mbref.counts(scene).redundant, rank(scene)) == (mbref.counts(whole).redundant, rank(whole))
     dependent = singular_values(scene)[rank(scene) :]
-    assert dependent.max(initial=0.0) < 1e-13
+    assert dependent.max(initial=0.0) < 1e-13  # of rows of length 1
 
 
 @pytest.mark.parametrize("name", LOOPS)
@@ -86,7 +86,8 @@ def test_engines_accelerate_a_rounded_mechanism_as_the_judge(name):
 
 def test_three_parallel_cranks_need_twelve_digits_to_move():
     """Rounded to 7 digits they are not parallel and locked: the run completes at rest, with a message. With 9
-    digits the rank is uncertain, and the run asks for 12; with 12 digits they move as without rounding."""
+    digits the rank is uncertain, and the run asks for 12; with 12 digits they move as without rounding, to
+    1e-10 m."""
     runs = {d: simulate(turned("five_bar_gravity", d), "taylor", [0.0, 0.01]) for d in (7, 9, 12, None)}
     outcomes = [run.outcome for run in runs.values()]
     assert outcomes == [Outcome.COMPLETED, Outcome.UNDECIDED, Outcome.COMPLETED, Outcome.COMPLETED]

@@ -19,7 +19,8 @@ def grids(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_speed_grid_recognises_scenes_with_singular_positions(grids):
-    """Crank and rod of the heavy slider-crank are equal: it crosses them; of the other they are not."""
+    """Crank and rod of the heavy slider-crank are equally long, so that it has singular positions; the other
+    slider-crank's are not."""
     assert grids.passes_singular_position(SCENES["planar_slider_crank_heavy"]())
     assert not grids.passes_singular_position(SCENES["planar_slider_crank_gravity"]())
 

@@ -25,7 +25,7 @@ from tests.crosscheck.measured import MARGIN, ROUNDING
 
 
 def test_probes_have_every_type_of_joint_load_and_driver():
-    """The types are those of the classes in the scene format."""
+    """The scene format's classes declare the types."""
 
     def kinds(union) -> set[str]:
         return {kind.model_fields["type"].default for kind in union.__args__[0].__args__}

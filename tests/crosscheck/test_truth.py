@@ -78,8 +78,8 @@ def test_coupler_of_a_driven_rhombus_moves_on_a_circle_without_turning(scene, st
 
 
 def test_four_bar_chain_has_the_published_position_and_velocity():
-    """Of the top of the first upright (m, m/s) at 10 s, by a finite-element code of second order. Its step of
-    1.25e-4 s leaves errors of some 1e-6, below the limit of 4e-6."""
+    """The top of the first upright (m, m/s) at 10 s, by a published finite-element code of second order. Its
+    step of 1.25e-4 s leaves errors of some 1e-6, below the limit of 4e-6."""
     published = {"position": (0.3284573768, 0.9445187937), "velocity": (1.423050003, -0.4948670827)}
     found = truth_for(SCENES["four_bar_chain"]()).poses(np.array([10.0]))
     for name, value in published.items():
@@ -171,8 +171,8 @@ def test_block_on_a_damped_spring_is_the_damped_oscillator():
 
 def test_truth_ends_where_a_spring_has_no_length():
     """A bar turned by half a turn brings a spring to length zero, where its force jumps. At the time that the
-    error states the angle is π, to 1e-6 rad, and the energy that of the start: spring and spin of 0.0533 kg
-    m² about the pivot."""
+    error states, the angle is π to 1e-6 rad, and the energy of spring and spin (0.0533 kg m² about the pivot)
+    equals the start's to 1e-10."""
     twist = {"velocity": (0.0, 1.0, 0.0), "angular_velocity": (0.0, 0.0, 5.0)}
     bar = Body(name="bar", mass=1.0, inertia=(0.001, 0.0133, 0.0133), position=(0.2, 0, 0), **twist)
     pull = spring("ground", (-0.4, 0, 0), "bar", (0.4, 0, 0), 20.0, 0.3)

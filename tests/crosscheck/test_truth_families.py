@@ -70,8 +70,9 @@ def test_truth_does_not_depend_on_the_sign_of_an_axis(name):
 @pytest.mark.parametrize(
     "name", ["four_bar", "spatial_slider_crank_driven", "pendulum_driven", "block_driven"]
 )
-def test_joint_seen_from_its_other_body_is_driven_backwards(name):
-    """With the bodies of each joint exchanged, the opposite driver gives the same motion."""
+def test_exchanged_bodies_of_joints_and_an_opposite_driver_give_an_equal_motion(name):
+    """The angle of a joint counts from its first body to the second, so that the exchange reverses its
+    sign."""
 
     def swapped(joint):
         axes = {"axes": joint.axes[::-1]} if isinstance(joint, Universal) else {}

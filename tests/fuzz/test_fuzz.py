@@ -18,7 +18,8 @@ def test_mutated_scene_is_accepted_or_refused_with_a_scene_error(target, count, 
 
 
 def test_random_command_line_ends_with_a_documented_status_and_message(tmp_path, monkeypatch):
-    """Otherwise than by status 0, 1, 2 or 130, or with a traceback or a file, a case has a defect."""
+    """Documented are the statuses 0, 1, 2 and 130. A traceback, or a file that is left behind, is a
+    defect."""
     monkeypatch.chdir(tmp_path)
     cases = {seed: targets.case("command_line", seed) for seed in SHORT}
     assert not {seed: defect for seed, (_, defect) in cases.items() if defect}

@@ -45,7 +45,8 @@ def four_bar(places, driver=None):
 
 @pytest.mark.parametrize("seed", range(10))
 def test_a_driven_crossed_four_bar_stays_crossed_through_flat_positions(seed):
-    """The coupler's middle is that of the pins at the crank's angle θ₀ + ω t (closed form ``pins``)."""
+    """The closed form ``pins`` has the pins at the crank's angle θ₀ + ω t; the coupler's middle is between
+    them."""
     crank, frame, angle, rate = drawn(seed)
     times = np.linspace(0.0, END, 31)
     run = simulate(four_bar(pins(crank, frame, angle), (0.0, rate)), "taylor", times, Limits(rtol=1e-9))
@@ -57,7 +58,7 @@ def test_a_driven_crossed_four_bar_stays_crossed_through_flat_positions(seed):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_swinging_crossed_four_bar_stays_crossed_and_loses_no_energy(seed):
-    """The coupler's middle is that of the pins at the crank's angle; no energy is lost."""
+    """The closed form ``pins`` has the pins at the crank's angle; the coupler's middle is between them."""
     crank, frame, angle, rate = drawn(seed)
     scene = four_bar(pins(crank, frame, angle))
     spun = scene.with_(

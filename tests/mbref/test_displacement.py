@@ -34,6 +34,7 @@ def test_rotation_of_a_displacement_is_about_the_body_s_own_axes():
 
 
 def test_displacements_of_a_batch_equal_single_displacements():
-    """To the bit."""
+    """``all_displaced`` of three displacements gives the poses of three calls of ``displaced``, to the
+    bit."""
     many = np.array([X, -X, 2.0 * X])
     assert np.array_equal(all_displaced(Q, many), [displaced(Q, x) for x in many])

@@ -28,7 +28,8 @@ def flat_times(end):
 )
 @pytest.mark.parametrize("name", LINKAGES)
 def test_every_flat_position_of_a_driven_parallelogram_is_recorded_at_its_time(name, limits):
-    """The crank passes 40 half turns in 1 s; the closed form is that of a parallelogram."""
+    """Poses meet the parallelogram's closed form. The crank passes 40 half turns in 1 s; at each recorded
+    time it is within 1e-9 rad of one."""
     scene = SCENES[name]()
     run = simulate(scene, "taylor", np.linspace(0.0, 1.0, 9), Limits(**limits))
     assert relative_error(run, scene) < ROUNDING

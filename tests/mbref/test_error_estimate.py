@@ -212,6 +212,8 @@ def test_estimate_with_missing_samples_is_read_back_equal_from_its_json_text():
 
 
 def test_command_prints_the_estimate_unless_the_option_forbids_it(capsys, pendulums, tmp_path):
+    """The table has the estimate of --json in two digits, and the warning; with --estimate no there is
+    neither."""
     path = tmp_path / "pendulums.toml"
     pendulums.save(path)
     command = ["run", str(path), "--rtol", "1e-4"]

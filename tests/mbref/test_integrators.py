@@ -162,8 +162,8 @@ def test_order_of_adams_outside_1_to_12_is_refused(order):
         simulate(OSCILLATOR, f"lm1+none/adams[max_order={order}]", [1.0])
 
 
-def test_coefficients_of_dop853_are_those_of_scipy():
-    """To the bit: A, B and C of the stages, and weights of the error estimates of order 3 and 5."""
+def test_coefficients_of_dop853_equal_scipy_s_to_the_bit():
+    """A, B and C of the stages, and weights of the error estimates of order 3 and 5."""
     theirs = scipy.integrate.DOP853
     assert np.array_equal([[*row, *[0.0] * (STAGES - len(row))] for row in A], theirs.A[:STAGES, :STAGES])
     assert np.array_equal((B, C), (theirs.B, theirs.C[:STAGES]))

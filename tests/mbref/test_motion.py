@@ -39,7 +39,7 @@ def test_angle_of_a_driven_joint_is_counted_over_full_turns(driven):
 
 def test_angle_of_a_joint_does_not_depend_on_the_sign_of_quaternions(driven):
     """p and -p are one orientation. Signs of all bodies are changed, then of the crank alone at samples 1, 2,
-    4, 5 …: joint A counts as before."""
+    4, 5 …: the angle of joint A stays."""
     other = Motion.of(driven.mechanism, dataclasses.replace(driven, orientation=-driven.orientation))
     crank_alone = driven.orientation * np.array([-1.0, 1.0, 1.0])[:, None]
     one = Motion.of(driven.mechanism, dataclasses.replace(driven, orientation=crank_alone))
@@ -69,7 +69,7 @@ def test_unknown_body_or_joint_is_refused_with_the_known_ones(crank):
         crank.joint("Z")
 
 
-def test_energy_of_a_tumbling_body_is_that_of_its_principal_axes():
+def test_energy_of_a_tumbling_body_follows_from_its_rates_about_its_principal_axes():
     """½ (A p² + B q² + C r²) with the rates about its own axes: 9.7 J, constant without moments while the
     angular velocity changes by more than 1 rad/s."""
     moments, spin, turn = np.array([1.0, 2.0, 2.5]), np.array([3.0, 0.4, -1.0]), (0.5, -0.5, 0.5, 0.5)
@@ -83,7 +83,7 @@ def test_energy_of_a_tumbling_body_is_that_of_its_principal_axes():
     )
     motion = simulate(Scene(name="top", body=(body,)), times=TIMES * 20, limits=Limits(rtol=1e-11))
     own = np.array([-spin[2], -spin[0], spin[1]])  # the quaternion turns x to -z, y to -x and z to y
-    assert motion.kinetic_energy[0] == pytest.approx(moments @ own**2 / 2, rel=1e-14)
+    assert motion.kinetic_energy[0] == pytest.approx(moments @ own**2 / 2, rel=1e-14)  # 50 roundings
     assert np.ptp(motion.angular_velocity[:, 0], axis=0).max() > 1.0
     assert np.ptp(motion.kinetic_energy) < 10 * 1e-11 * 9.7  # ten times rtol
 

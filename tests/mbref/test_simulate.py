@@ -111,7 +111,7 @@ def test_slightly_wrong_velocities_are_corrected_and_reported():
     assert "velocities" in corrected.message
     largest = np.abs(start.velocity).max()  # m/s
     assert 0 < difference(corrected.velocity[0], start.velocity[0]) < 1e-3 * largest
-    assert corrected.violation.velocity.max() < 1e-9
+    assert corrected.violation.velocity.max() < 1e-9  # m/s; rounding of 20 m/s, over steps of 1e-7
 
 
 def test_run_that_violates_a_joint_too_much_ends_and_names_the_joint():

@@ -171,6 +171,7 @@ def test_variants_of_springs_and_full_inertias_together_equal_single_runs():
     "method", ["mpi-svd+baumgarte", "taylor", "mpi-qr+projection", "lm2+projection/rk4[step=1e-4]"]
 )
 def test_variants_by_methods_of_each_kind_together_equal_single_runs(method):
+    """``compared`` runs three variants in a batch and alone; none differs in a bit."""
     assert not compared(
         list(variants(CRANK, [MASS, LENGTH], 3)), np.linspace(0.0, 0.01, 3), method=method
     ).differing

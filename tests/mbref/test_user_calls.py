@@ -24,7 +24,7 @@ def test_diagnosis_takes_a_file_s_name_a_built_in_name_or_a_scene(saved):
 
 
 def test_duration_gives_a_run_101_samples_up_to_its_end(saved):
-    """They are those of 101 equidistant times."""
+    """The run equals one at 101 equidistant times."""
     run = mbref.simulate(saved, "lm1+none", duration=0.1)
     assert run.times[-1] == 0.1 and len(run.times) == 101, run.times
     given = mbref.simulate(saved, "lm1+none", np.linspace(0.0, 0.1, 101))

@@ -24,6 +24,8 @@ def test_pages_print_more_than_50_commands_of_both_programs():
     ("page", "words"), FOUND, ids=[f"{page}: {' '.join(words)}" for page, words in FOUND]
 )
 def test_command_that_a_page_prints_is_accepted_by_its_parser(page, words):
+    """The parsers of mbref and crosscheck accept it. Other commands name a file or module for python that
+    exists, an existing test after ``-k``, or the packaged conformance tests."""
     program, *arguments = words
     if program in PARSERS:
         plain = arguments[: arguments.index(">")] if ">" in arguments else arguments

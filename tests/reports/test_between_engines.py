@@ -36,8 +36,8 @@ def cells(blocks: list[Block], table: int = 0) -> list[list[str]]:
 
 
 def test_undetermined_components_are_listed_for_each_engine():
-    """The five-bar has redundant rows: the table has the components that they leave undetermined, at the
-    middle sample, of each engine. Some are larger than 1 N, and so than rounding."""
+    """The five-bar has redundant rows. The table has, for each engine, the components that they leave
+    undetermined at the middle sample. Some are larger than 1 N, so they are not rounding."""
     group = runs_of("five_bar")
     blocks = reactions.render(group)
     tables = [block for block in blocks if isinstance(block, Table)]
@@ -59,8 +59,8 @@ def test_undetermined_components_of_rounding_size_are_called_zero():
 
 
 def test_accelerations_table_shows_the_difference_put_in():
-    """MuJoCo's accelerations of centres are 1 % too large; the table is relative to the largest, by Gauss's
-    principle, angular accelerations included."""
+    """MuJoCo's accelerations of centres are 1 % too large. The table shows this, in two digits, relative to
+    the largest of Gauss's principle, angular accelerations included."""
     group = runs_of("planar_slider_crank_gravity")
     shown = {engine: accelerations for engine, _, accelerations, *_ in cells(accelerations.render(group))}
     exact = gauss(group.scene)
@@ -103,8 +103,8 @@ def parted() -> SceneRuns:
 
 
 def test_both_branches_of_the_rhombus_move_side_by_side(parted):
-    """Both panels show the smooth branch in the background, and their own branch: the same at the start, with
-    the couplers apart at the end."""
+    """Both panels show the smooth branch in the background, and their own branch in colour. The branches have
+    equal poses at the start, and other poses of the coupler at the end."""
     (block,) = [b for b in crossings.render(parted) if isinstance(b, Moving)]
     assert [title for title, _ in block.panels] == ["Branch 1, smooth", "Branch 2"]
     assert (

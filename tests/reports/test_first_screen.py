@@ -43,7 +43,7 @@ def test_opening_names_the_worst_run_and_who_is_right():
     assert opening.sentences["Who is right"].startswith("mbref is inaccurate at best on spatial_slider_crank")
 
 
-def test_links_of_the_page_lead_to_places_of_the_page_and_every_run_has_one(page):
+def test_links_of_the_page_lead_to_places_of_the_page_and_every_run_has_a_place(page):
     """No place's id occurs twice."""
     ids = set(re.findall(r' id="([^"]+)"', page))
     links = set(re.findall(r'href="#([^"]+)"', page))

@@ -42,6 +42,7 @@ def test_every_page_folds_some_of_its_text(page):
 
 @pytest.mark.parametrize("name", ["closed-loops", "convergence"])
 def test_page_of_runs_shows_less_than_a_fifth_of_its_text_and_folds_the_rest(name):
+    """The page opens with verdicts and maps; lists of runs and commands are folded in <details>."""
     made = (RESULTS / f"{name}.md").read_text()
     shown = re.sub(r"<details.*?</details>", "", made, flags=re.S)
     assert len(shown) < 0.2 * len(made)

@@ -49,7 +49,7 @@ def everything():
 
 
 def test_every_section_has_its_heading():
-    """Of level 2, or 3 within the section of a scene."""
+    """Headings are of level 2, and of level 3 within the section of a scene."""
     headings = [(part.level, part.text) for part in blocks(groups()) if isinstance(part, Heading)]
     of_all = {"Summary", "spatial_slider_crank", "Order of convergence", "Least errors", "Records", "Support"}
     of_a_scene = {"The mechanism", "Speed against error", "Constraint violation over time", "Outcomes"}

@@ -62,7 +62,8 @@ def test_comparison_with_even_samples_is_shortened_to_end_just_before_the_dead_p
 
 @pytest.mark.slow
 def test_comparison_with_uneven_samples_keeps_the_samples_before_the_dead_position():
-    """With no sample before it, the comparison is as asked for."""
+    """If no sample is before it, the comparison ends at the requested samples and reports no dead
+    position."""
     scene, time = pushed(0.2, 0.5, 1.0, 0.7)
     uneven = followed(scene, np.array([0.1 * time, 0.5 * time, 2.0 * time]), SECONDS)
     assert np.array_equal(uneven.times, [0.1 * time, 0.5 * time])

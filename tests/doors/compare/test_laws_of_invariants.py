@@ -36,7 +36,8 @@ def test_cell_names_rounding_failures_and_refusals() -> None:
 def test_explicit_euler_feeds_energy_into_a_tumbling_body_and_symplectic_euler_does_not(
     step: Step, status: str
 ) -> None:
-    """Both are of order 1, with the same energy error of the other sign."""
+    """Both are of order 1, with energy errors of equal size and opposite sign. Check passive allows no
+    gain."""
     body = next(each.scene for each in specimens() if each.scene.name == "tumbling body")
     bench = trial.set_up(InProcess(low_order(step, parts=(10, 20))), Specimen(body, keeps="energy"))
     assert suite.verdict_on("passive", bench).status == status

@@ -36,7 +36,8 @@ def failures(step: Step, scenes: list[str], fault: str = "") -> list[str]:
 @pytest.mark.parametrize("step", [euler, symplectic_euler, midpoint])
 @pytest.mark.parametrize("scene", RUNS)
 def test_engine_of_low_order_with_right_equations_violates_no_check(step: Step, scene: str):
-    """Euler's methods have order 1, the midpoint method order 2; their errors are not those of an engine."""
+    """Euler's methods have order 1, the midpoint method order 2. Errors of their steps are not reported as
+    faults."""
     assert failures(step, [scene]) == []
 
 
@@ -50,12 +51,12 @@ def test_fault_in_an_engine_of_low_order_violates_a_check_on_the_scene_that_show
 
 @pytest.mark.parametrize("step", [euler, midpoint])
 def test_free_fall_by_low_order_violates_no_check_but_does_with_twice_the_gravity(step: Step):
-    """The same engine with one planted fault."""
+    """The steps of both methods are accurate enough for a free body; the planted fault is none of theirs."""
     assert failures(step, ["free_fall"]) == []
     assert failures(step, ["free_fall"], "gravity acts twice")
 
 
 @pytest.mark.parametrize("step", [symplectic_euler, midpoint])
 def test_engine_of_low_order_that_ignores_armature_violates_a_check_on_a_pendulum_with_armature(step: Step):
-    """The gate's case of the slow tests above."""
+    """A quick case of the slow tests above: the accelerations lack the armature, whatever the steps are."""
     assert failures(step, ["armature pendulum"], "armature is ignored")

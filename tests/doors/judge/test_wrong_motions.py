@@ -28,6 +28,8 @@ SHIFT = np.array([0.003, -0.004, 0.012])  # m
 SHIFTED = 0.013  # m, its length
 AXIS = np.array([2.0, -3.0, 6.0]) / 7.0
 SAMPLES = 9
+ROUNDING = 1e-12  # m, rad, or relative: 5000 rounding units of numbers near 1
+CLOSE = 1e-9  # relative error of a small difference of two numbers near 1, of at least 1e-3
 
 
 def double_hinge() -> Scene:
@@ -80,8 +82,8 @@ def test_true_motion_has_no_error_and_no_violation(make):
     """The run is the truth at its own times: errors and violations are rounding, 5000 units at most."""
     found = measured(make)
     for name in ("error", "velocity_error", "violation_position", "violation_velocity"):
-        assert found[name] <= 1e-12, name
-    assert found["scd"] > 12 and found["error_bound"] <= 1e-11
+        assert found[name] <= ROUNDING, name
+    assert found["scd"] > 12
 
 
 def test_measures_of_a_run_are_each_metric_and_bound_and_end_of_the_truth():
@@ -96,21 +98,21 @@ def test_a_shift_is_measured_in_lengths_of_the_mechanism(make, sample):
     """The last body is shifted by 13 mm at one sample; scd is -log₁₀ of the error, its correct digits."""
     scene, _, exact = exact_of(make)
     found = measured(make, position=changed(exact.position, sample, -1, SHIFT))
-    assert found["position_error"] == pytest.approx(SHIFTED / scene_length(scene), rel=1e-9)
-    assert found["error"] == found["position_error"] and found["rotation_error"] < 1e-12
+    assert found["position_error"] == pytest.approx(SHIFTED / scene_length(scene), rel=CLOSE)
+    assert found["error"] == found["position_error"] and found["rotation_error"] < ROUNDING
     assert found["scd"] == pytest.approx(-math.log10(SHIFTED / scene_length(scene)))
 
 
 @pytest.mark.parametrize("make", MAKERS)
 @pytest.mark.parametrize("angle", [1e-6, 0.02, 3.0])
 def test_a_rotation_is_measured_by_its_angle(make, angle):
-    """Quaternions of the other sign are no error."""
+    """One body is turned at one sample; all quaternions have the opposite sign, which is no rotation."""
     _, _, exact = exact_of(make)
     orientation = exact.orientation.copy()
     orientation[4, 0] = rotations.multiply(rotations.from_vector(angle * AXIS), orientation[4, 0])
     found = measured(make, orientation=-orientation)
-    assert found["rotation_error"] == pytest.approx(angle, abs=1e-12)
-    assert found["error"] == found["rotation_error"] and found["position_error"] < 1e-12
+    assert found["rotation_error"] == pytest.approx(angle, abs=ROUNDING)
+    assert found["error"] == found["rotation_error"] and found["position_error"] < ROUNDING
 
 
 @pytest.mark.parametrize("late", [1e-5, 1e-4])
@@ -124,7 +126,7 @@ def test_error_of_a_delayed_mechanism_is_its_largest_speed_times_the_delay(late)
     spin = np.linalg.norm(exact.angular_velocity[1:], axis=2).max()
     assert found["position_error"] == pytest.approx(late * speed / scene_length(scene), rel=100 * late)
     assert found["rotation_error"] == pytest.approx(late * spin, rel=100 * late)
-    assert found["violation_position"] < 1e-13 and found["violation_velocity"] < 1e-12
+    assert found["violation_position"] < ROUNDING and found["violation_velocity"] < ROUNDING
 
 
 def test_error_of_a_growing_shift_is_its_size_at_the_last_sample():
@@ -132,7 +134,7 @@ def test_error_of_a_growing_shift_is_its_size_at_the_last_sample():
     scene, truth, exact = exact_of(double_hinge)
     off = exact.position + SHIFT * np.maximum(np.arange(SAMPLES) - 3, 0)[:, None, None]
     whole = measure(scene, replace(exact, position=off), truth)
-    assert whole["position_error"] == pytest.approx((SAMPLES - 4) * SHIFTED / scene_length(scene), rel=1e-9)
+    assert whole["position_error"] == pytest.approx((SAMPLES - 4) * SHIFTED / scene_length(scene), rel=CLOSE)
     assert whole["error_until"] == exact.times[-1]
 
 
@@ -151,12 +153,12 @@ def test_velocities_too_fast_by_a_share_have_that_error_and_kinetic_energies_tha
     scene, _, exact = exact_of(double_hinge)
     faster = {name: (1 + share) * getattr(exact, name) for name in ("velocity", "angular_velocity")}
     found = measured(double_hinge, **faster)
-    assert found["velocity_error"] == pytest.approx(share, rel=1e-9)
-    assert found["violation_velocity"] < 1e-12
+    assert found["velocity_error"] == pytest.approx(share, rel=CLOSE)
+    assert found["violation_velocity"] < ROUNDING
     kinetic = kinetic_energy(scene, exact.position, exact.orientation, exact.velocity, exact.angular_velocity)
     run = replace(exact, **faster)
     drift = ((1 + share) ** 2 - 1) * kinetic / largest_energy(scene, run)
-    assert energy_series(scene, run) == pytest.approx(drift, abs=1e-12)
+    assert energy_series(scene, run) == pytest.approx(drift, abs=ROUNDING)
 
 
 def test_violation_of_a_joint_is_the_gap_that_is_put_in_at_every_level():
@@ -167,7 +169,7 @@ def test_violation_of_a_joint_is_the_gap_that_is_put_in_at_every_level():
         moved = changed(getattr(exact, level), 3, 1, factor * SHIFT)
         found = measured(double_hinge, **{level: moved})[f"violation_{level}"]
         size = factor * SHIFTED / scene_length(scene)
-        assert size / math.sqrt(3) <= found <= size * (1 + 1e-9)
+        assert size / math.sqrt(3) <= found <= size * (1 + CLOSE)
 
 
 def test_violation_of_gears_that_slip_is_their_angle_and_its_rate():
@@ -180,12 +182,12 @@ def test_violation_of_gears_that_slip_is_their_angle_and_its_rate():
     centre = np.array([0.5, 0.0, 0.0])
     place[2:, 1] = centre + rotations.rotate(turn, place[2:, 1] - centre)
     found = measured(make, orientation=orientation, position=place)
-    assert found["violation_position"] == pytest.approx(0.02, rel=1e-9)
-    assert found["rotation_error"] == pytest.approx(0.02, rel=1e-9)
+    assert found["violation_position"] == pytest.approx(0.02, rel=CLOSE)
+    assert found["rotation_error"] == pytest.approx(0.02, rel=CLOSE)
     spin = changed(exact.angular_velocity, 4, 1, 0.3 * np.array(Z))
     velocity = changed(exact.velocity, 4, 1, np.cross(0.3 * np.array(Z), exact.position[4, 1] - centre))
     found = measured(make, angular_velocity=spin, velocity=velocity)
-    assert found["violation_velocity"] == pytest.approx(0.3, rel=1e-9)
+    assert found["violation_velocity"] == pytest.approx(0.3, rel=CLOSE)
 
 
 @pytest.mark.parametrize("height", [0.005, 0.01])
@@ -197,14 +199,14 @@ def test_energy_drift_of_lifted_blocks_is_their_weight_times_the_height(height):
     run = replace(exact, position=place)
     off = energy_series(scene, run)
     weight = sum(body.mass for body in scene.body) * np.linalg.norm(GRAVITY)
-    assert off[5] == pytest.approx(weight * height / largest_energy(scene, run), rel=1e-9)
-    assert np.delete(off, 5).max() < 1e-12
+    assert off[5] == pytest.approx(weight * height / largest_energy(scene, run), rel=CLOSE)
+    assert np.delete(off, 5).max() < ROUNDING
 
 
 def test_momentum_drift_of_a_pushed_body_is_the_change_of_its_momentum():
     """1.5 kg at 3 m/s get 0.9 m/s across: 1.5 · 0.9 of the largest 1.5 √(3² + 0.9²) kg m/s."""
     scene, _, exact = exact_of(flying)
-    assert momentum_series(scene, exact).max() < 1e-13
+    assert momentum_series(scene, exact).max() < ROUNDING
     across = np.array([0.0, 1.0, 1.0]) / math.sqrt(2)
     off = momentum_series(scene, replace(exact, velocity=changed(exact.velocity, 6, 0, 0.9 * across)))
     assert off.argmax() == 6 and off[6] == pytest.approx(0.9 / math.hypot(3.0, 0.9), rel=1e-6)
@@ -214,14 +216,15 @@ def test_momentum_drift_of_a_pushed_body_is_the_change_of_its_momentum():
 @pytest.mark.parametrize("make", [double_hinge, MOTIONS["planar_slider_crank_gravity"]])
 @pytest.mark.parametrize("share", [0.01, 0.2])
 def test_error_and_imbalance_of_reactions_too_large_by_a_share_are_that_share(make, share):
-    """True reactions have the error 0 and balance the accelerations, to rounding."""
+    """True reactions have the error 0 and balance the accelerations, to rounding (100 times for
+    accelerations)."""
     scene, truth, exact = exact_of(make)
     true = with_exact_reactions(scene, exact)
     larger = replace(true, reactions={name: (1 + share) * w for name, w in true.reactions.items()})
-    assert measure(scene, true, truth)["reaction_error"] < 1e-12
-    assert measure(scene, larger, truth)["reaction_error"] == pytest.approx(share, rel=1e-9)
-    assert balance(scene, true, exact) < 1e-10
-    assert balance(scene, larger, exact) == pytest.approx(share, rel=1e-9)
+    assert measure(scene, true, truth)["reaction_error"] < ROUNDING
+    assert measure(scene, larger, truth)["reaction_error"] == pytest.approx(share, rel=CLOSE)
+    assert balance(scene, true, exact) < 100 * ROUNDING
+    assert balance(scene, larger, exact) == pytest.approx(share, rel=CLOSE)
 
 
 def test_reaction_a_million_times_too_large_is_named_with_its_engine_and_joint():
@@ -317,7 +320,7 @@ def test_noise_of_positions_is_measured_within_a_factor_of_six(size):
     """A smooth motion has no sixth difference of neighbouring samples: rounding is found. Normal noise of a
     standard deviation (m) is found to a factor of six: twelve samples show its spread no better."""
     scene, run = double_hinge(), neighbouring_samples()
-    assert grain(scene, run)[0] < 1e-13
+    assert grain(scene, run)[0] < ROUNDING
     noise = size * np.random.default_rng(3).standard_normal(run.position.shape)
     found, of = grain(scene, replace(run, position=run.position + noise))
     assert of == "positions" and size / 6 < found * scene_length(scene) < 6 * size

@@ -81,7 +81,8 @@ def test_stacked_platforms_fall_as_folding_bars_let_them():
 @pytest.mark.parametrize("method", METHODS)
 def test_joints_of_walking_legs_stay_closed_and_their_energy_constant(method):
     """While the crank turns by more than 0.1 rad, the points of both bodies at each joint coincide to
-    rounding (m). The energy Σ (m v² + I ω²) / 2 + m g y stays within 1e-8 of the kinetic energy."""
+    rounding (m). The energy Σ (m v² + I ω²) / 2 + m g y stays within ten tolerances, 1e-8, of the kinetic
+    energy."""
     legs, end = 2, 0.1
     _, run = motion_of(f"strandbeest[{legs}]", method, end)
     scene = find_scene(f"strandbeest[{legs}]")

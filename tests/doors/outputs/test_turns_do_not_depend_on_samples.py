@@ -23,7 +23,8 @@ TIMES = np.linspace(0.0, END, 601)
 OUTPUTS = (".angle", ".torque", "energy")
 # taylor computes samples inside its steps. Other methods end steps at samples, so that their errors differ:
 # up to 1e-4 of an output in 20 turns. A missed turn would change an angle by 0.05 of its size or more.
-ROUNDING, STEPS = 1e-12, 1e-3
+ROUNDING, STEPS = 1e-12, 1e-3  # relative differences of outputs: by rounding, and by steps of other lengths
+CLOSE = 1e-9  # rad, or of the energy: rounding of angles of up to 100 rad over thousands of steps
 
 
 def wound_wheel() -> Scene:
@@ -79,7 +80,7 @@ def test_angle_of_a_wheel_on_a_spring_counts_full_turns_from_the_start(method, t
 
 @pytest.mark.parametrize("seed", range(8))
 def test_outputs_of_random_mechanisms_are_equal_for_other_samples(seed):
-    """Of few samples, or one, outputs at a time equal outputs of 601 samples to rounding."""
+    """A run with few samples, or one, has the outputs of a run with 601 samples, to rounding."""
     dense = mbref.simulate(spinning_mechanism(seed), "taylor", TIMES)
     assert dense.outcome is mbref.Outcome.COMPLETED, dense.message
     assert differences(dense, "taylor", np.random.default_rng(seed)) < ROUNDING
@@ -104,7 +105,7 @@ def test_angle_at_the_end_alone_is_the_angle_that_dense_samples_show(seed):
     late = mbref.simulate(scene, times=TIMES[[-1]])
     for joint in scene.joint:
         seen = np.unwrap(np.mod(dense.joint(joint.name).angle + np.pi, 2 * np.pi) - np.pi)
-        assert late.joint(joint.name).angle[0] == pytest.approx(seen[-1], abs=1e-9)
+        assert late.joint(joint.name).angle[0] == pytest.approx(seen[-1], abs=CLOSE)
 
 
 def test_run_file_table_and_json_have_the_angle_with_its_full_turns(tmp_path, capsys):
@@ -128,7 +129,8 @@ def test_run_file_table_and_json_have_the_angle_with_its_full_turns(tmp_path, ca
 
 
 def test_angle_of_each_scene_of_a_batch_counts_its_full_turns():
-    """φ = 40 (1 - cos √(k / I) t) for three stiffnesses k."""
+    """φ = 40 (1 - cos √(k / I) t) for three stiffnesses k; at a tolerance of 1e-9 the run is off by less than
+    1e-7."""
     scenes = [wound_wheel().with_("load[0].stiffness", k) for k in (9.0, STIFFNESS, 20.0)]
     with ThreadPoolExecutor(1) as pool:
         found = dict(mbref.ensemble(scenes, [END], executor=pool))
@@ -140,11 +142,11 @@ def test_angle_of_each_scene_of_a_batch_counts_its_full_turns():
 
 
 def test_angle_of_an_engine_without_turns_is_nan_where_its_samples_are_too_far_apart():
-    """Poses and rates at 5 ms determine the turns between them; those at 0, 0.7 and 3 s do not, nor does a
-    first sample at 2.9 s. The energy has that of the spring, so it is not known there either."""
+    """Poses and rates at 5 ms determine the turns between them; samples at 0, 0.7 and 3 s do not, nor does a
+    first sample at 2.9 s. The energy includes the spring's, so it is not known there either."""
     motion = mbref.simulate(wound_wheel(), times=TIMES)
     dense = mbref.Motion.of(motion.mechanism, replace(motion, angles=None))
-    assert dense.joint("H").angle == pytest.approx(motion.joint("H").angle, abs=1e-9)
+    assert dense.joint("H").angle == pytest.approx(motion.joint("H").angle, abs=CLOSE)
     few = mbref.simulate(wound_wheel(), times=[0.0, 0.7, END])
     sparse = mbref.Motion.of(few.mechanism, replace(few, angles=None))
     assert np.isnan(sparse.joint("H").angle).tolist() == [False, True, True]
@@ -154,10 +156,10 @@ def test_angle_of_an_engine_without_turns_is_nan_where_its_samples_are_too_far_a
 
 
 def test_judge_sees_a_miscounted_turn_of_few_samples_as_a_change_of_energy():
-    """The energy of the spring, 12 (φ - 40)² / 2, depends on the turns. With the run's own it stays; a turn
-    more changes it by more than a thousandth; without turns the judge does not know it (None)."""
+    """The energy of the spring, 12 (φ - 40)² / 2, depends on the turns. With the run's own turns it is
+    constant; one turn more changes it by more than 0.001; without turns it is unknown (None)."""
     few = mbref.simulate(wound_wheel(), times=[0.7, END])
-    assert energy_series(few.mechanism, few).max() < 1e-9
+    assert energy_series(few.mechanism, few).max() < CLOSE
     assert energy_series(few.mechanism, replace(few, angles=None)) is None
     wrong = {"H": few.angles["H"] + 2 * np.pi}
     assert energy_series(few.mechanism, replace(few, angles=wrong)).min() > 1e-3

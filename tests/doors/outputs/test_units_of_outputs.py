@@ -43,7 +43,7 @@ def motion():
     return mbref.simulate(crank(), times=TIMES)
 
 
-def test_columns_in_other_units_are_the_same_quantities(motion):
+def test_columns_in_other_units_times_the_size_of_the_unit_are_the_si_columns(motion):
     """Torques follow from the units of force and length; powers and energies keep their own."""
     plain, converted = motion.columns(), motion.columns(units="mm,deg,kN,ms")
     assert len(plain) == len(converted)
@@ -73,7 +73,7 @@ def test_decimal_commas_without_a_spreadsheet_to_write_are_refused(capsys):
     assert "--decimal-comma: needs --out FILE.csv" in capsys.readouterr().err
 
 
-def test_spreadsheet_with_decimal_commas_is_read_as_the_same_motion(motion, tmp_path):
+def test_spreadsheet_with_decimal_commas_is_read_with_the_values_of_the_motion(motion, tmp_path):
     """The judge's reader takes units from the headers."""
     motion.to_csv(tmp_path / "crank.csv", units="mm,deg,kN,ms", decimal_comma=True)
     text = (tmp_path / "crank.csv").read_text(encoding="utf-8-sig").splitlines()

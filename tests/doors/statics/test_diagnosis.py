@@ -53,8 +53,8 @@ def test_rows_redundancy_and_freedoms_are_those_that_the_judge_finds_at_every_si
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8, 220))
-def test_rows_redundancy_and_freedoms_of_many_mechanisms_are_those_that_the_judge_finds(seed):
-    """The same scene in another unit of length has the same diagnosis."""
+def test_rows_redundancy_and_freedoms_of_many_mechanisms_equal_the_judges_in_any_unit_of_length(seed):
+    """The judge's counts are ``mobility``; the scene in another unit of length has an equal diagnosis."""
     scene = random_mechanism(seed)
     counts = diagnose(scene).counts
     assert (counts.rows, counts.redundant, counts.degrees_of_freedom) == tuple(mobility(scene))
