@@ -59,10 +59,7 @@ def test_length_of_a_single_body_is_its_way_or_its_radius_of_gyration(parts, mor
 PARTS = scene(
     body("b", 1.0, 0.0, 0.0),
     body("c", 3.0, 0.0, 0.0),
-    joint=(
-        hinge("A"),
-        Cylindrical(name="C", bodies=("ground", "c"), anchor=O, axis=X),
-    ),
+    joint=(hinge("A"), Cylindrical(name="C", bodies=("ground", "c"), anchor=O, axis=X)),
 )
 POSE = constraints.initial_poses(PARTS)
 

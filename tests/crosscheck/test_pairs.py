@@ -13,17 +13,7 @@ from crosscheck.judge.metrics import error_series, in_scene_order
 from crosscheck.judge.tolerances import LIKE_TRUTH
 from crosscheck.processes.serve import run_once
 from mbref.motions.trajectory import Outcome
-from mbref.scene import (
-    Body,
-    Cylindrical,
-    Distance,
-    Driver,
-    Force,
-    Moment,
-    Revolute,
-    Scene,
-    TorsionSpring,
-)
+from mbref.scene import Body, Cylindrical, Distance, Driver, Force, Moment, Revolute, Scene, TorsionSpring
 from tests.crosscheck.side_by_side import side_by_side
 from tests.helpers.parts import spring
 

@@ -4,17 +4,7 @@ import numpy as np
 
 from crosscheck.judge.truth import closed_form
 from mbref import rotations
-from mbref.scene import (
-    Body,
-    Driver,
-    Force,
-    Moment,
-    Revolute,
-    Scene,
-    Sine,
-    TorsionSpring,
-    Translational,
-)
+from mbref.scene import Body, Driver, Force, Moment, Revolute, Scene, Sine, TorsionSpring, Translational
 from mbref.scenes import SCENES
 from tests.helpers.parts import Z, spring
 

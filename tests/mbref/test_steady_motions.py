@@ -113,10 +113,7 @@ BODIES = [*turning_pendulum(1.0).body, rod("free", (0.0, 0.0, 5.0), 1.0, 0.1)]
 
 @pytest.mark.parametrize(
     ("change", "says"),
-    [
-        ({"load": [PUSH]}, "loads"),
-        ({"joint": JOINTS, "body": BODIES}, "joint 'C' does not turn with it"),
-    ],
+    [({"load": [PUSH]}, "loads"), ({"joint": JOINTS, "body": BODIES}, "joint 'C' does not turn with it")],
 )
 def test_motions_that_are_not_steady_are_refused_with_the_cause(change, says):
     """A force on the ball has a direction fixed in space; a rod ties the ball to a point of the ground."""

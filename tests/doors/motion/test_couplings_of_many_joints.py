@@ -90,10 +90,7 @@ def test_both_formulations_of_the_reference_have_the_closed_form(name):
     """Each coordinate moves by q̈ t² / 2 (rad or m), in the rotations and places of both, to rounding."""
     make, masses, forces, ratios = CASES[name]
     scene, (q, _) = make(), accelerations(masses, forces, ratios)
-    for found in (
-        natural_motion(scene, TIMES, EXTENDED),
-        tree_motion(scene, TIMES, EXTENDED, seconds=100.0),
-    ):
+    for found in (natural_motion(scene, TIMES, EXTENDED), tree_motion(scene, TIMES, EXTENDED, seconds=100.0)):
         assert not found.reason
         position, p = doubles(found.position), doubles(found.orientation)
         for k, (_, kind) in enumerate(scene.coupled(scene.coupling[0])):
@@ -153,11 +150,7 @@ def test_sum_along_skew_axes_of_a_chain_has_the_judges_accelerations():
 
 
 @pytest.mark.parametrize(
-    ("name", "family", "options"),
-    [
-        ("simbody", "merson", {"accuracy": 1e-9}),
-        ("dart", "terms", {}),
-    ],
+    ("name", "family", "options"), [("simbody", "merson", {"accuracy": 1e-9}), ("dart", "terms", {})]
 )
 def test_engine_that_sums_coordinates_moves_a_differential_by_its_closed_form(name, family, options):
     """The cage's rate is q̈ t, to 1e-7 rad/s: a hundred times Simbody's accuracy."""
