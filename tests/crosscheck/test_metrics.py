@@ -11,7 +11,6 @@ from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.energy import energy_series
 from crosscheck.judge.metrics import cost_at_error, measure, order_of_convergence
 from crosscheck.judge.truth import NoSolution, truth_for
-from mbref import rotations
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Moment
 from mbref.scenes import SCENES
@@ -28,15 +27,6 @@ def bumped(array, sample, body, bump):
     changed = array.copy()
     changed[sample, body] += bump
     return changed
-
-
-def test_violation_of_an_angle_is_the_angle_put_in():
-    """The slider tilted about its own centre, where its joint with the rod is."""
-    orientation = EXACT.orientation.copy()
-    tilt = rotations.from_vector(np.array([0.0, 0.002, 0.0]))
-    orientation[3, 2] = rotations.multiply(tilt, orientation[3, 2])
-    got = measure(SCENE, replace(EXACT, orientation=orientation))["violation_position"]
-    assert got == pytest.approx(0.002, rel=1e-9), f"put in 0.002 rad, measured {got}"
 
 
 def test_work_of_a_moment_across_the_turning_axis_is_its_power_integrated():

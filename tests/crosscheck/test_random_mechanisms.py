@@ -19,7 +19,6 @@ from tests.crosscheck.measured import MARGIN
 ENGINES = ("mujoco", "pinocchio", "exudyn")
 # largest error of accelerations on 124 mechanisms, times their distance to a singular position
 MEASURED = {"mujoco": 4.8e-10, "pinocchio": 1.7e-13, "exudyn": 2.1e-8, PRINCIPLE: 9.3e-14}
-MANY = range(200)
 SOME = (1, 3, 9, 10, 15, 16)  # every joint type, one to three loops; the last is near a singular position
 
 
@@ -38,17 +37,11 @@ def excess(seeds: Sequence[int]) -> float:
     )
 
 
-def test_engines_accelerate_six_random_mechanisms_as_mbref():
+@pytest.mark.parametrize("seeds", [SOME, pytest.param(range(200), marks=pytest.mark.slow)], ids=["6", "200"])
+def test_engines_accelerate_random_mechanisms_as_mbref(seeds):
     """Initial accelerations by three engines and by Gauss's principle; every joint type, one to three loops.
     ``excess`` is the largest difference from mbref over 10 times the measured one."""
-    assert excess(SOME) <= 1
-
-
-@pytest.mark.slow
-def test_engines_accelerate_many_random_mechanisms_as_mbref():
-    """Initial accelerations of 200 mechanisms by three engines and Gauss's principle: ``excess`` is the
-    largest difference from mbref over 10 times the measured one."""
-    assert excess(MANY) <= 1
+    assert excess(seeds) <= 1
 
 
 def test_random_mechanisms_have_every_joint_type_and_up_to_three_loops():

@@ -75,17 +75,18 @@ def test_warning_needs_an_error_above_a_thousand_tolerances_and_a_millionth(rtol
     assert bool(estimate(0.0, 0.0, error, 0.0, rtol=rtol).warning) == warns
 
 
-def test_warning_states_the_error_its_time_and_a_tighter_tolerance_with_its_error():
-    """``tighter`` holds a tolerance that was tried and its largest error; without it none is named."""
-    found = estimate(0.0, 1e-3, 0.5, 3.1, rtol=1e-5, tighter=(1e-12, 6e-8))
-    assert found.warning == "sensitive motion: error about 3 from t = 1 s on; rtol 1e-12 gives 6e-08"
-    assert "gives" not in replace(found, tighter=None).warning
-
-
-def test_warning_calls_a_run_inaccurate_if_the_error_at_a_tighter_rtol_is_below_a_thousand_times_it():
-    """With rtol 1e-12 the error is 9e-10, less than a thousand times 1e-12: the motion is not sensitive."""
-    found = estimate(0.0, 1e-3, 0.5, 3.1, rtol=1e-5, tighter=(1e-12, 0.9e-9))
-    assert found.warning == "inaccurate run: error about 3 from t = 1 s on; rtol 1e-12 gives 9e-10"
+@pytest.mark.parametrize(
+    ("tighter", "says"),
+    [
+        ((1e-12, 6e-8), "sensitive motion: error about 3 from t = 1 s on; rtol 1e-12 gives 6e-08"),
+        ((1e-12, 0.9e-9), "inaccurate run: error about 3 from t = 1 s on; rtol 1e-12 gives 9e-10"),
+        (None, "sensitive motion: error about 3 from t = 1 s on"),
+    ],
+)
+def test_warning_states_the_error_its_time_and_a_tighter_tolerance_with_its_error(tighter, says):
+    """``tighter`` has a tolerance that was tried and its largest error. A run whose error falls below a
+    thousand times this tolerance was inaccurate; otherwise the motion is sensitive."""
+    assert estimate(0.0, 1e-3, 0.5, 3.1, rtol=1e-5, tighter=tighter).warning == says
 
 
 def test_estimate_of_a_run_in_fixed_steps_has_no_warning():

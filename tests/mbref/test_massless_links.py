@@ -53,11 +53,6 @@ def test_two_hinges_at_a_massless_link_move_as_a_universal_joint(method):
     assert np.allclose(motion["load"].position, other["load"].position, atol=10 * ACCURACY)
 
 
-def test_method_that_divides_by_masses_names_the_massless_link():
-    message = simulate(hip(), "mpi-svd+projection", times=TIMES).message
-    assert "body 'link' lacks mass or a moment of inertia; taylor completes this motion" in message
-
-
 def test_free_link_of_mass_zero_is_named_as_undetermined():
     """The link hangs by a hinge at the load, and nothing else acts on it."""
     tip = LINK.model_copy(update={"name": "tip", "position": (0.3, 0.1, -1.2)})

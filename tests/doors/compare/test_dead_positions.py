@@ -20,19 +20,19 @@ def end_of(scene: Scene, end: float | None = None) -> float | None:
     return dead_position(scene, Pose(*initial_poses(scene)), 0.0, end or scene.duration)
 
 
-@pytest.mark.parametrize(  # lengths (units of size m), start angle of the crank (rad)
-    ("crank", "rod", "angle", "size"), [(0.2, 0.5, 1.0, 1.0), (0.4, 0.3, 0.5, 1e-3), (0.1, 1.0, -1.4, 1e3)]
+@pytest.mark.parametrize(  # crank, rod (units of the size, m), start angle of the crank (rad), speed
+    ("scene", "time"),
+    [
+        pushed(0.2, 0.5, 1.0, 0.7, 1.0),
+        pushed(0.4, 0.3, 0.5, 0.7, 1e-3),
+        pushed(0.1, 1.0, -1.4, 0.7, 1e3),
+        turned(0.5, 0.4, 0.3, 4.0),
+    ],
+    ids=["pushed", "pushed, 1 mm", "pushed, 1 km", "turned"],
 )
-def test_time_of_a_dead_position_is_when_crank_and_rod_are_in_line(crank, rod, angle, size):
-    """A driver pushes the slider at a constant speed; it cannot go farther than crank + rod from the shaft.
-    `pushed` computes the time of this place in closed form."""
-    scene, time = pushed(crank, rod, angle, 0.7, size)
-    assert end_of(scene) == pytest.approx(time, rel=ACCURACY)
-
-
-def test_crank_longer_than_its_rod_is_dead_when_the_rod_stands_upright():
-    """The crank's pin is then at the height of the rod's length, 0.5 sin θ = 0.4; `turned` gives the time."""
-    scene, time = turned(0.5, 0.4, 0.3, 4.0)
+def test_reference_ends_at_the_dead_position_of_a_driven_slider_crank(scene, time):
+    """Closed forms: a pushed slider cannot go farther than crank + rod from the shaft; a crank that is longer
+    than its rod cannot turn on when the rod stands upright."""
     assert end_of(scene) == pytest.approx(time, rel=ACCURACY)
 
 

@@ -95,95 +95,18 @@ def test_reference_agrees_with_the_closed_form_within_its_bound(name):
     assert turned_between(found.orientation, exact.orientation).max() <= allowed
 
 
-# --- invariance -------------------------------------------------------------------------------------------
-def largest_difference(found: Trajectory, wanted: Trajectory) -> float:
-    """Return the largest difference of a position (over the largest one), of an orientation (rad), or of a
-    velocity, over ten times the largest one: velocities are less exact."""
-    order = [found.bodies.index(name) for name in wanted.bodies]
-    states = {
-        name: getattr(wanted, name) for name in ("position", "orientation", "velocity", "angular_velocity")
-    }
-    arrays = {name: getattr(found, name)[:, order] for name in states}
-    length = np.abs(wanted.position).max()
-    spin, speed = np.abs(wanted.angular_velocity).max(), np.abs(wanted.velocity).max()
-    fastest = max(spin, speed / length)
-    return max(
-        np.abs(arrays["position"] - wanted.position).max() / length,
-        turned_between(arrays["orientation"], wanted.orientation).max(),
-        np.abs(arrays["angular_velocity"] - wanted.angular_velocity).max() / (10 * fastest),
-        np.abs(arrays["velocity"] - wanted.velocity).max() / (10 * fastest * length),
-    )
-
-
-def exact_motion(name: str) -> Trajectory:
-    """Return the stored states of a short motion as a trajectory."""
-    scene, exact = MOTIONS[name](), stored()[name]
-    states = {
-        field: np.array(exact[field]) for field in ("position", "orientation", "velocity", "angular_velocity")
-    }
-    names = tuple(body.name for body in scene.body)
-    return Trajectory(scene.name, "truth", "", exact["by"], {}, times_of(scene), names, **states)
-
-
-def bound_of(name: str) -> float:
-    """Return the bound on the difference of two motions, twice the bound of each. A singular position
-    magnifies the rounding of the scene's changed numbers: there it is 100 bounds."""
-    return (100.0 if name in CROSSED else 2.0) * max(stored()[name]["bound"], 20 * ROUNDING)
-
-
-@pytest.mark.parametrize("name", a_few(list(MOTIONS), 15, 2))
-def test_motion_does_not_depend_on_the_units_of_mass_length_and_time(name):
-    """In grams, millimetres and tenths of seconds the stored motion has 1e3 times the positions and 1e2 times
-    the velocities."""
-    scene = in_other_units(MOTIONS[name](), 1e3, 1e3, 10.0)
-    exact = exact_motion(name)
-    wanted = Trajectory(
-        **{
-            **vars(exact),
-            "times": 10 * exact.times,
-            "position": 1e3 * exact.position,
-            "velocity": 1e2 * exact.velocity,
-            "angular_velocity": exact.angular_velocity / 10,
-        }
-    )
-    assert largest_difference(motion_of(scene), wanted) <= bound_of(name)
-
-
-@pytest.mark.parametrize("name", a_few(list(MOTIONS), 15, 5))
-def test_motion_turns_and_shifts_with_the_frame(name):
-    """The stored motion, turned and shifted, is the truth. Ten bounds: the shift of 0.6 m makes positions
-    larger than the mechanism, and so their rounding."""
-    exact = exact_motion(name)
-    wanted = Trajectory(
-        **{
-            **vars(exact),
-            "position": rotations.rotate(TURN, exact.position) + SHIFT,
-            "orientation": rotations.multiply(TURN, exact.orientation),
-            "velocity": rotations.rotate(TURN, exact.velocity),
-            "angular_velocity": rotations.rotate(TURN, exact.angular_velocity),
-        }
-    )
-    found = motion_of(in_another_frame(MOTIONS[name](), TURN, SHIFT))
-    assert largest_difference(found, wanted) <= 10 * bound_of(name)
-
-
-@pytest.mark.parametrize("name", a_few(list(MOTIONS), 15, 8))
-def test_motion_does_not_depend_on_the_order_of_bodies_joints_and_loads(name):
-    """The stored motion of the scene in its own order is the truth."""
-    scene = in_another_order(MOTIONS[name]())
-    assert largest_difference(motion_of(scene), exact_motion(name)) <= bound_of(name)
-
-
+# --- invariance, beside tests/doors/judge/test_relations_of_motions.py -----------------------------------
 @pytest.mark.parametrize("name", a_few(SMOOTH, 25, 3))
 def test_states_of_a_reference_do_not_depend_on_other_samples(name):
-    """States at the stored times are the stored ones, though six more times are asked for."""
+    """The judge's states at the stored times equal the stored ones, though it computes six more samples."""
     scene = MOTIONS[name]()
     times = np.union1d(times_of(scene), scene.duration * np.array([0.05, 0.11, 0.5, 0.52, 0.9, 0.99]))
     found = motion_of(scene, times)
     chosen = np.isin(times, times_of(scene))
     exact = stored()[name]
-    assert np.abs(found.position[chosen] - exact["position"]).max() <= 2 * bound_of(name)
-    assert turned_between(found.orientation[chosen], np.array(exact["orientation"])).max() <= bound_of(name)
+    bound = 2 * max(exact["bound"], 20 * ROUNDING)  # both states have one
+    assert np.abs(found.position[chosen] - exact["position"]).max() <= 2 * bound
+    assert turned_between(found.orientation[chosen], np.array(exact["orientation"])).max() <= bound
 
 
 @pytest.mark.parametrize("name", a_few(SMOOTH, 6, 1))

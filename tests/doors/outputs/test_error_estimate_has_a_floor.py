@@ -1,6 +1,7 @@
 """The true error is at most ten error estimates: an estimate is at least the error by rounding."""
 
 import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -61,6 +62,7 @@ def sliding(rate: float) -> tuple[Scene, Truth]:
 
 
 MAKERS = (spinning, driven, twisted, resting, flying, sliding)
+RATES, RTOLS = (0.07, 1.0, 19.0, 410.0), (1e-6, 1e-9, 1e-13)
 
 
 def true_error(scene: Scene, motion: mbref.Motion, truth: Truth) -> np.ndarray:
@@ -84,19 +86,18 @@ def errors_over_estimates(make, rate: float, method: str | None, rtol: float) ->
         return true_error(scene, motion, truth) / estimate
 
 
+@pytest.mark.parametrize(
+    ("rate", "method", "rtol"),
+    [
+        (3.3, None, 1e-12),
+        *(pytest.param(*each, marks=pytest.mark.slow) for each in product(RATES, ["taylor"], RTOLS)),
+    ],
+)
 @pytest.mark.parametrize("make", MAKERS)
-def test_true_error_is_at_most_ten_estimates(make):
-    """The closed form of each motion has the error. An estimate is an order of size: ten is its promise."""
-    assert errors_over_estimates(make, 3.3, None, 1e-12).max() <= 10
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-13])
-@pytest.mark.parametrize("rate", [0.07, 1.0, 19.0, 410.0])
-@pytest.mark.parametrize("make", MAKERS)
-def test_true_error_of_many_motions_is_at_most_ten_estimates(make, rate, rtol):
-    """Rates are speeds in rad/s or m/s, or a distance from the origin in m."""
-    assert errors_over_estimates(make, rate, "taylor", rtol).max() <= 10
+def test_true_error_is_at_most_ten_estimates(make, rate, method, rtol):
+    """The closed form of each motion has the error. An estimate is an order of size: ten is its promise. A
+    rate is a speed in rad/s or m/s, or a distance from the origin in m."""
+    assert errors_over_estimates(make, rate, method, rtol).max() <= 10
 
 
 @pytest.mark.parametrize("make", [resting, spinning])
