@@ -195,7 +195,8 @@ def test_derivatives_of_the_path_of_a_spatial_slider_crank_are_differences(line,
 
 # --- motions along a path ---------------------------------------------------------------------------------
 def test_a_weightless_pendulum_turns_at_constant_speed():
-    """2 m at -3 rad/s: 6 m/s, and 18 m/s² towards the hinge, also after a quarter turn at π/6 s."""
+    """2 m at -3 rad/s: 6 m/s, and 18 m/s² towards the hinge, also after a quarter turn at π/6 s. Limits are
+    some thousand roundings."""
     moving = PENDULUM.with_(body=(body("bar", 0.0, -2.0, 0.5, angular_velocity=(0.0, 0.0, -3.0)),))
     truth = one_dof(moving, parallelogram(moving))
     found = truth.poses(np.array([0.0, math.pi / 6]))

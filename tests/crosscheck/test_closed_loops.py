@@ -23,7 +23,8 @@ def test_every_mechanism_of_the_table_is_found_by_its_name_and_has_a_truth(colum
 
 
 def test_column_turned_has_the_four_bar_rotated_by_seven_tenths_of_a_radian() -> None:
-    """The least-squares rotation (Kabsch) of its anchors and axes maps all of them, and has that angle."""
+    """The least-squares rotation (Kabsch) of its anchors and axes maps all of them, and has that angle. All
+    of this holds to rounding."""
     by_heading = {column.heading: column.make() for column in DIFFICULTIES}
     plain, turned = (
         np.array([[joint.anchor, joint.axis] for joint in by_heading[name].joint]).reshape(-1, 3)

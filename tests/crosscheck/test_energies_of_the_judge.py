@@ -55,7 +55,7 @@ def test_a_moment_works_along_the_angle_of_a_hinge_or_of_a_free_body(hinge):
     if hinge:
         velocity[:, 0] = [(-p[1] * 0.5, p[0] * 0.5, 0.0) for p in places]
     run = still(*places, angles=(0.0, 0.25, 0.5), angular_velocity=spin, velocity=velocity)
-    assert drift(of, run) == pytest.approx([0.0, 0.5, 1.0], abs=1e-12)
+    assert drift(of, run) == pytest.approx([0.0, 0.5, 1.0], abs=1e-12)  # J, rounding
 
 
 def test_energy_error_is_the_drift_relative_to_the_largest_energy():

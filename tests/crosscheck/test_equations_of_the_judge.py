@@ -43,13 +43,14 @@ def test_derivatives_of_a_polynomial_with_a_sine_equal_their_formulas(derivative
     smooth = np.polynomial.Polynomial((-0.2 * math.sin(0.7), 0.5, -0.3, 0.2))
     wave = 0.2 * 3.0**derivative * np.sin(3.0 * t + 0.7 + derivative * math.pi / 2)
     wanted = (smooth.deriv(derivative) if derivative else smooth)(t) + wave
-    assert time_functions.value(LAW, t, derivative) == pytest.approx(wanted, abs=1e-13)
+    assert time_functions.value(LAW, t, derivative) == pytest.approx(wanted, abs=1e-13)  # rounding of 20
 
 
 @pytest.mark.parametrize("derivative", range(4))
 @pytest.mark.parametrize("rows", [TABLE, TABLE[:4]])
 def test_a_table_of_a_driver_is_joined_by_scipys_cubic_spline(derivative, rows):
-    """The spline's third derivative is continuous at the second row from each end (not-a-knot)."""
+    """The spline's third derivative is continuous at the second row from each end (not-a-knot). Both differ
+    by rounding over the intervals (s) cubed."""
     law, spline = Driver(joint="J", table=rows), CubicSpline(*zip(*rows, strict=True))
     t = np.array([0.01, 0.15, 0.3, 0.45, 0.5, 0.7, rows[-1][0] - 0.01])
     assert time_functions.value(law, t, derivative) == pytest.approx(spline(t, derivative), abs=1e-11)
@@ -226,7 +227,7 @@ def test_terms_of_a_pendulum_are_its_forces_mass_and_constraint_rows():
         [0, 0, 0, 0, 0, 0.3],
     )
     for force, expected in zip(terms.forces.values(), wanted, strict=True):
-        assert force == pytest.approx(np.array(expected, dtype=float), abs=1e-14)
+        assert force == pytest.approx(np.array(expected, dtype=float), abs=1e-14)  # N, N m
     assert np.diag(terms.mass) == pytest.approx([2, 2, 2, 0.3, 0.4, 0.5]) and terms.mass[3, 4] == 0.1
     assert terms.joints == ("J",) * 5 and terms.rows.shape == (5, 6) and not terms.of_drivers.any()
     assert np.linalg.norm(terms.of_velocities) == pytest.approx(4.0), "ω² r towards the hinge"
@@ -237,7 +238,7 @@ def test_terms_of_a_pendulum_are_its_forces_mass_and_constraint_rows():
     angle = 2 * math.atan2(motion.orientation[1, 0, 3], motion.orientation[1, 0, 0])
     assert later.forces["load[1] (torsion_spring at 'J')"][5] == pytest.approx(-3.0 * (angle - 0.1))
     direct = np.hstack([motion.acceleration[1, 0], motion.angular_acceleration[1, 0]])
-    assert of_terms(scene, later) == pytest.approx(direct, abs=1e-9)
+    assert of_terms(scene, later) == pytest.approx(direct, abs=1e-9)  # m/s², rad/s²
 
 
 def test_scaled_terms_are_multiples_of_one_force_part_of_gamma_or_inertia():

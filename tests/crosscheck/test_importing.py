@@ -93,7 +93,7 @@ def test_an_open_connect_of_sites_is_closed_with_the_lengths_of_the_file(tmp_pat
     scene = found.imported.scene
     at = np.array(scene.joint_named("C").anchor)
     for other, length in (("B", 0.6), ("D", 0.5)):
-        assert np.linalg.norm(at - scene.joint_named(other).anchor) == pytest.approx(length, abs=1e-11)
+        assert np.linalg.norm(at - scene.joint_named(other).anchor) == pytest.approx(length, abs=1e-11)  # m
     assert np.linalg.norm(np.subtract(scene.joint_named("B").anchor, (0, 0, 1))) == pytest.approx(0.25)
     assert any("'C' was open by 0.5" in note for note in found.imported.notes)
     assert difference(found) < SAME
@@ -156,7 +156,7 @@ def test_bodies_of_a_weld_are_assembled_at_its_relative_pose(tmp_path):
     assert joint.type == "fixed" and any("'W' was open by" in note for note in held.imported.notes)
     a, b = held.imported.scene.body
     angle = 2 * np.arccos(abs(np.dot(a.orientation, b.orientation)))
-    assert angle == pytest.approx(0.5, abs=1e-9)
+    assert angle == pytest.approx(0.5, abs=1e-9)  # rad
     assert difference(held) < SAME
 
 
@@ -292,7 +292,7 @@ def test_a_mimic_joint_is_a_coupling_whose_offset_the_pose_meets(tmp_path):
     (coupling,) = scene.coupling
     assert (coupling.joints, coupling.ratio) == (("j1", "j2"), -1.5)
     first, second = found.qpos
-    assert second == pytest.approx(0.3 - 1.5 * first, abs=1e-12)
+    assert second == pytest.approx(0.3 - 1.5 * first, abs=1e-12)  # rad
 
 
 # two wheels on parallel hinges, coupled by q₂ = POLY(q₁); the first has an armature of 0.02 kg m²
@@ -305,7 +305,8 @@ GEARS = """<mujoco><option gravity="0 0 -9.81"/><worldbody>
 
 
 def test_a_linear_equality_of_joints_is_a_coupling_that_the_motion_keeps(tmp_path):
-    """q₂ = -2 q₁, and the first wheel turns by more than 0.01 rad in 0.2 s."""
+    """q₂ = -2 q₁, and the first wheel turns by more than 0.01 rad in 0.2 s. The angles obey the ratio to the
+    tolerance of the run, 1e-9."""
     found = read(tmp_path, GEARS.replace("POLY", "0 -2 0 0 0"))
     assert difference(found) < SAME
     (coupling,) = found.imported.scene.coupling

@@ -25,7 +25,7 @@ def test_quaternion_of_a_rotation_matrix_has_its_axis_and_angle(axis, angle):
 
 def test_largest_component_of_each_quaternion_is_positive():
     """For 100 random unit quaternions q, in double and in extended precision: the quaternion of q's rotation
-    matrix is q or -q, whose largest component is positive."""
+    matrix is q or -q, whose largest component is positive. All to rounding."""
     q = np.random.default_rng(3).normal(size=(2, 50, 4))
     q /= np.linalg.norm(q, axis=2, keepdims=True)
     signs = np.sign(np.take_along_axis(q, np.abs(q).argmax(axis=2)[..., None], axis=2))

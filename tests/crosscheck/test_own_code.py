@@ -31,7 +31,7 @@ MODEL = (
 )
 def test_shown_mjcf_and_python_set_the_options_of_a_mujoco_run(family, options):
     """A model with the shown XML and Python has the options, softness and regularisers of the adapter's
-    model."""
+    model. Regularisers agree to rounding."""
     mujoco = pytest.importorskip("mujoco")
     from crosscheck.engines.mujoco.simulation import Simulation
 

@@ -47,7 +47,8 @@ def door(kind: type) -> Scene:
 
 
 def test_two_ball_hinges_share_only_the_force_along_their_line():
-    """Statics leaves one component of each ball open: equal and opposite forces along the line of both, z."""
+    """Statics leaves one component of each ball open: equal and opposite forces along the line of both, z.
+    The basis has length one and this direction, to rounding."""
     shared = shared_wrenches(door(Spherical), 0.0, *initial_poses(door(Spherical)))
     for name, basis in shared.items():
         assert basis.shape == (6, 1), f"{name}: {basis.shape[1]} shared wrenches, by hand 1"

@@ -36,7 +36,7 @@ POSE = initial_poses(PAIR)
 
 def test_unit_multiplier_of_a_coupling_acts_along_both_coordinates():
     """The last column has the unit multiplier of x = θ / 2: a force of 1 N along x on slide T, and a moment
-    of -1/2 N m about z on hinge A. The first ten columns are the joints' own, five each."""
+    of -1/2 N m about z on hinge A. The first ten columns are the joints' own, five each. All to rounding."""
     rows, _ = jacobian(PAIR, 0.0, *POSE)
     found = {joint.name: wrench for joint, wrench in joint_reactions.of_multipliers(PAIR, rows, *POSE)}
     assert found["A"].shape == found["T"].shape == (6, 11)

@@ -35,7 +35,7 @@ def test_tree_formulation_crosses_the_dead_positions_of_equal_crank_and_rod():
     scene, times = SCENES["planar_slider_crank_equal"](), np.linspace(0.0, 0.14, 8)
     motion, exact = tree_motion(scene, times, EXTENDED, seconds=SECONDS), closed_form(scene).poses(times)
     assert not motion.reason
-    assert motion.crossings == pytest.approx((0.061192, 0.120704), abs=3e-6)
+    assert motion.crossings == pytest.approx((0.061192, 0.120704), abs=3e-6)  # s
     off = np.abs(doubles(motion.position) - exact.position).max()
     assert 0 < off < LOST / 10, f"off by {off:.1e} m"
 

@@ -250,7 +250,7 @@ def test_cheapest_step_by_closure_gap_counts_distances_and_no_angles():
 @pytest.mark.parametrize(("text", "metres"), [("1mm", 1e-3), ("0.5 in", 0.0127), ("2e-4", 2e-4)])
 def test_length_option_takes_a_unit_and_means_metres_without(text, metres):
     """1 in = 25.4 mm."""
-    assert length(text) == pytest.approx(metres, rel=1e-15)
+    assert length(text) == pytest.approx(metres, rel=1e-15)  # four roundings
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,8 @@ def by_sign(eigenvalues):
 
 def test_a_damped_torsion_spring_has_the_roots_of_its_equation():
     """J s² + c s + k = 0 about the natural angle, at which the arm rests. Angles of the equilibrium's scene
-    count from its pose: it has the natural angle 0, and is its own equilibrium."""
+    count from its pose: it has the natural angle 0, and is its own equilibrium. Eigenvalues are exact to
+    rounding."""
     spring = {"type": "torsion_spring", "joint": "A", "stiffness": 40.0, "damping": 3.0, "natural_angle": 0.4}
     [each] = equilibria(pendulum(gravity=ORIGIN, load=[spring]), starts=1)
     roots = np.roots([INERTIA + MASS * ARM**2, 3.0, 40.0])

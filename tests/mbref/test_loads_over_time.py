@@ -71,7 +71,7 @@ def test_equilibrium_of_a_load_over_time_is_refused():
 def test_equilibrium_of_a_sprung_slide_has_its_frequency_and_a_relaxed_spring():
     """ω = √(k / m) with k = 50 N/m and m = 2 kg; the spring's displacement counts from the new pose."""
     found = mbref.equilibria(scenes.sprung_slide())
-    assert [load.natural_displacement for load in found[0].scene.load] == [pytest.approx(0.0, abs=1e-9)]
+    assert [load.natural_displacement for load in found[0].scene.load] == [pytest.approx(0.0, abs=1e-9)]  # m
     assert found[0].frequencies[0] == pytest.approx(np.sqrt(50.0 / 2.0) / 2 / np.pi)
 
 

@@ -83,4 +83,4 @@ def test_body_whose_centre_is_off_its_anchor_by_rounding_slides_at_its_speed():
     load = LOAD.model_copy(update={"position": (0.45000000000000007, -0.05, -0.275), "velocity": X})
     motion = simulate(Scene(name="s", body=(load,), joint=(slide,)), times=TIMES)
     assert motion.outcome == Outcome.COMPLETED
-    assert np.allclose(motion["load"].position[:, 0], 0.45 + TIMES, atol=1e-12)
+    assert np.allclose(motion["load"].position[:, 0], 0.45 + TIMES, atol=1e-12)  # m

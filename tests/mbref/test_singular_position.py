@@ -74,7 +74,7 @@ def test_recorded_pose_of_a_flat_parallelogram_has_all_bodies_on_its_line():
     """The links of 0.5 m lie on the x axis where it is flat; the last step ends within 0.1 mm of it."""
     scene, end = LOOPS["four"]
     run = simulate(scene, "alf-dual+projection", [end])
-    assert np.abs(run.crossings[0].position[:, 1]).max() < 1e-4
+    assert np.abs(run.crossings[0].position[:, 1]).max() < 1e-4  # m
 
 
 FAILURES = ("LEFT_MOTION", "NOT_CONVERGED", "STEP_FAILED")  # rounding decides which one

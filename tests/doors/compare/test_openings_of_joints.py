@@ -30,7 +30,8 @@ def standing(scene: Scene, moved: np.ndarray, turned: np.ndarray) -> Trajectory:
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("seed", range(4))
 def test_opening_has_the_distance_of_the_joints_points_and_the_tilt_of_its_axis(size: float, seed: int):
-    """The arm is shifted by a random vector, and tilted about x while its hinge turns about z."""
+    """The arm is shifted by a random vector, and tilted about x while its hinge turns about z. Rounding of
+    the arms is below 1e-9 of both."""
     random = np.random.default_rng(seed)
     moved, tilt = 0.01 * size * random.normal(size=3), random.uniform(0.1, 1.0)
     found = opening(arms(size), standing(arms(size), moved, np.array([tilt, 0.0, 0.0])))

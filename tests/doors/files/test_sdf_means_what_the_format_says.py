@@ -63,7 +63,7 @@ def test_a_screw_moves_by_its_pitch_a_turn(files, more, metres_a_turn):
     motion = mbref.simulate(scene.with_(gravity=(0.0, 0.0, -9.81)), times=[0.0, 0.3])
     turned, moved = motion.joint("s").angle[-1], motion["nut"].position[-1][2]
     assert abs(turned) > 1e-2
-    assert moved == pytest.approx(metres_a_turn * turned / (2 * math.pi), rel=1e-9)
+    assert moved == pytest.approx(metres_a_turn * turned / (2 * math.pi), rel=1e-9)  # rtol of the run
 
 
 def test_joints_of_a_mimic_with_an_offset_start_at_angles_that_obey_it(files):
@@ -80,7 +80,7 @@ def test_joints_of_a_mimic_with_an_offset_start_at_angles_that_obey_it(files):
     assert "follow mimics lead with an offset of -0.4" in out
     start = mbref.assembled(scene)
     angles = [2 * math.atan2(body.orientation[3], body.orientation[0]) for body in start.body]
-    assert angles[1] == pytest.approx(-1.5 * (angles[0] + 0.4) + 0.2, abs=1e-12)
+    assert angles[1] == pytest.approx(-1.5 * (angles[0] + 0.4) + 0.2, abs=1e-12)  # rad
     assert max(map(abs, angles)) > 0.1
 
 

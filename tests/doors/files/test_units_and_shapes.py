@@ -162,7 +162,8 @@ def solid(shape):
     ids=lambda shape: shape["type"],
 )
 def test_mass_and_moments_of_a_shape_are_its_integrals(shape):
-    """∫ ρ dV and ∫ ρ (|r|² δ − r r) dV by quadrature; a rod is a cylinder without thickness."""
+    """∫ ρ dV and ∫ ρ (|r|² δ − r r) dV by quadrature; a rod is a cylinder without thickness. Both are exact
+    to rounding."""
     points, volumes = solid(shape)
     mass = float(7850 * volumes.sum())
     moments = 7850 * volumes @ ((points**2).sum(axis=1)[:, None] - points**2)

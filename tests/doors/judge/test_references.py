@@ -186,4 +186,4 @@ def test_angle_after_400_unsampled_oscillations_is_exact_or_reported_as_unknown(
     assert main(["reference", str(path), "--samples", "2", "--out", str(table)]) == (0 if known else 1)
     assert ("unknown: A.angle" in capsys.readouterr().out) is not known
     angle = np.genfromtxt(table, delimiter=",", names=True)["Aangle_rad"]
-    assert angle == pytest.approx([0.0, 0.0 if known else np.nan], abs=1e-9, nan_ok=True)
+    assert angle == pytest.approx([0.0, 0.0 if known else np.nan], abs=1e-9, nan_ok=True)  # rad

@@ -38,7 +38,7 @@ def on_a_slide() -> Scene:
 
 def test_a_block_on_a_bushing_moves_as_a_damped_oscillator_and_the_message_names_the_bushing():
     """m x'' = -k x - c x', so x = v/ω e^(-δt) sin ωt and x'' = -c v / m at the start. The message says that
-    the ends of the spring coincide there."""
+    the ends of the spring coincide there. Accelerations are exact to rounding."""
     run = simulate(on_a_slide(), times=[0.0, *TIMES])
     decay = DAMPING / (2 * MASS)
     rate = np.sqrt(STIFFNESS / MASS - decay**2)
@@ -78,7 +78,7 @@ def test_taylor_refuses_a_bushing_and_names_the_method_to_use(tmp_path, capsys):
 
 def test_acceleration_by_the_judge_has_the_damping_of_a_bushing_whose_ends_part():
     """The block's is -c v / m. A pendulum at rest has -m g l² / I, as without its bushing: a division by the
-    length zero would fail the test by its warning."""
+    length zero would fail the test by its warning. Both are exact to rounding."""
     assert gauss(on_a_slide())[0, 0] == pytest.approx(-DAMPING / MASS * SPEED, rel=1e-12)
     hanging = Scene(
         name="rest",

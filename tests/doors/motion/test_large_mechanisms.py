@@ -80,4 +80,4 @@ def test_wheels_of_a_long_row_of_gears_turn_by_the_drivers_angle_in_turns_of_sig
     scene = Scene(name="row", body=body, joint=joint, coupling=gears, driver=driver)
     motion = simulate(scene, "alf-dual+projection/dop853", times=[1.0])
     angles = [motion.joint(f"J{k}").angle[0] for k in range(count)]
-    assert angles == pytest.approx([0.5 * (-1) ** k for k in range(count)], abs=1e-9)
+    assert angles == pytest.approx([0.5 * (-1) ** k for k in range(count)], abs=1e-9)  # rad

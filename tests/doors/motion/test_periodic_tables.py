@@ -30,14 +30,16 @@ def driven(duration: float = 2.5) -> mbref.Scene:
 @pytest.mark.parametrize("method", ["taylor", "lm1+projection"])
 @pytest.mark.parametrize("duration", [2.5, 0.8, 1.0])
 def test_wheel_turns_by_the_periodic_spline_through_the_rows_of_its_driver(duration, method):
-    """Angles and accelerations of SciPy's spline, also at times beyond the scene's duration."""
+    """Angles and accelerations of SciPy's spline, also at times beyond the scene's duration. Angles are exact
+    to rounding, accelerations to 1000 rtol, 1e-12."""
     motion = mbref.simulate(driven(duration), method, SAMPLES, rtol=1e-12)
     assert motion.joint("J").angle == pytest.approx(EXACT(SAMPLES % PERIOD), abs=1e-12)
     assert motion.angular_acceleration[:, 0, 2] == pytest.approx(EXACT(SAMPLES % PERIOD, 2), abs=1e-9)
 
 
 def test_mass_under_a_periodic_force_moves_as_both_formulations_of_the_reference(tmp_path):
-    """∬ a dt² of the spline from rest, with a linear part: its mean acts, too. A saved scene moves alike."""
+    """∬ a dt² of the spline from rest, with a linear part: its mean acts, too. A saved scene moves alike.
+    Limits (m): ten times rtol, 1e-12, and rounding for the judge."""
     load = JointForce(joint="J", force=2.0, factor=Factor(table=TABLE, periodic=True))
     scene = slide(load).with_(duration=2.5)
     scene.save(tmp_path / "slide.toml")

@@ -102,7 +102,7 @@ def test_two_hinges_in_place_of_one_carry_half_its_force_each():
     """The hinges are 0.2 m apart, symmetric to the plane of the links. The motion stays."""
     single, pairs = find_scene("four_bar_chain[3]"), doubled(3, 0.2)
     one, two = run_of(single), run_of(pairs)
-    assert two.position == pytest.approx(one.position, abs=1e-11)
+    assert two.position == pytest.approx(one.position, abs=1e-11)  # m
     assert max(unbalanced(pairs, two)) < UNBALANCED
     for joint in single.joint:
         left, right = (two.reactions[f"{joint.name}{side}"][:, :3] for side in "lr")

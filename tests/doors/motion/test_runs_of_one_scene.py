@@ -48,7 +48,7 @@ def test_changed_copy_moves_by_its_own_numbers(copy):
     change = {"body": (*heavier, *scene.body[1:])}
     changed = scene.with_(**change) if copy == "with_" else scene.model_copy(update=change)
     found = simulate(changed, times=TIMES).position
-    assert np.abs(found - before)[-1].max() > 1e-6
+    assert np.abs(found - before)[-1].max() > 1e-6  # m
     assert np.array_equal(
         found, simulate(find_scene(scene.name).with_(name="copy", **change), times=TIMES).position
     )

@@ -44,7 +44,8 @@ def motion():
 
 
 def test_columns_in_other_units_times_the_size_of_the_unit_are_the_si_columns(motion):
-    """Torques follow from the units of force and length; powers and energies keep their own."""
+    """Torques follow from the units of force and length; powers and energies keep their own. Conversion costs
+    a few roundings."""
     plain, converted = motion.columns(), motion.columns(units="mm,deg,kN,ms")
     assert len(plain) == len(converted)
     for (name, values), (header, others) in zip(plain.items(), converted.items(), strict=True):
@@ -74,7 +75,7 @@ def test_decimal_commas_without_a_spreadsheet_to_write_are_refused(capsys):
 
 
 def test_spreadsheet_with_decimal_commas_is_read_with_the_values_of_the_motion(motion, tmp_path):
-    """The judge's reader takes units from the headers."""
+    """The judge's reader takes units from the headers. Conversion of units costs some roundings."""
     motion.to_csv(tmp_path / "crank.csv", units="mm,deg,kN,ms", decimal_comma=True)
     text = (tmp_path / "crank.csv").read_text(encoding="utf-8-sig").splitlines()
     assert text[0].startswith("time [ms];mass.orientation.w;") and "." not in text[2]
@@ -87,7 +88,8 @@ def test_spreadsheet_with_decimal_commas_is_read_with_the_values_of_the_motion(m
 
 def test_largest_reaction_of_a_crank_is_at_the_bottom(motion, tmp_path, capsys):
     """m (ω² r + g) after three quarters of a turn. The driver's torque m g r is largest where the crank is
-    level, also in the moment at the anchor."""
+    level, also in the moment at the anchor. The driver prescribes the motion, so that all is exact to
+    rounding."""
     found = motion.reaction_maxima()["A"]
     assert found.force == pytest.approx(MASS * (RATE**2 * RADIUS + G), rel=1e-12)
     assert found.force_time == 0.75 and found.open == 0
@@ -104,8 +106,8 @@ def test_plot_over_the_angle_of_a_driver_has_the_columns_as_curves(motion):
     figure = motion.plot("mass.position", "A.angle", over="A.angle", units="mm,deg")
     panel, lowest = figure.axes
     assert lowest.get_xlabel() == "A.angle, deg" and panel.get_ylabel() == "position, mm"
-    assert np.allclose(panel.lines[1].get_xdata(), 360 * TIMES, atol=1e-9)
-    assert np.allclose(panel.lines[1].get_ydata(), 250 * np.sin(RATE * TIMES), atol=1e-9)
+    assert np.allclose(panel.lines[1].get_xdata(), 360 * TIMES, atol=1e-9)  # degrees
+    assert np.allclose(panel.lines[1].get_ydata(), 250 * np.sin(RATE * TIMES), atol=1e-9)  # mm
 
 
 def test_columns_of_one_unit_share_a_panel_on_request(motion):
@@ -138,4 +140,4 @@ def test_several_motions_are_drawn_into_given_axes(motion):
 def test_data_frame_has_the_requested_columns_in_units(motion):
     frame = motion.to_dataframe("mass.position.x", units="mm")
     assert list(frame.columns) == ["mass.position.x [mm]"] and frame.index.name == "time [s]"
-    assert np.allclose(frame["mass.position.x [mm]"], 250 * np.cos(RATE * TIMES), atol=1e-9)
+    assert np.allclose(frame["mass.position.x [mm]"], 250 * np.cos(RATE * TIMES), atol=1e-9)  # mm

@@ -31,7 +31,8 @@ def table(of_motor: float, of_slide: float) -> Scene:
 
 @pytest.mark.parametrize("armatures", [(0.0, 0.0), (0.7, 0.0), (0.0, 1.3), (0.7, 1.3)])
 def test_armature_changes_the_frequency_of_a_carriage_on_a_turntable_and_not_its_place(armatures):
-    """Closed forms: m ω² (r + x) = k x, and vibrations of √((k - m ω²) / (m + I)) rad/s."""
+    """Closed forms: m ω² (r + x) = k x, and vibrations of √((k - m ω²) / (m + I)) rad/s. Relative errors are
+    below 1e-9 of the place and 1e-7 of the frequency."""
     (found,) = equilibria(table(*armatures), starts=2)
     place = START * STIFFNESS / (STIFFNESS - MASS * RATE**2)
     assert np.linalg.norm(found.scene.body[1].position) == pytest.approx(place, rel=1e-9)

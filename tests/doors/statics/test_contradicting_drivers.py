@@ -68,7 +68,7 @@ def test_table_of_13_digits_agrees_with_its_cubic_from_rest(order):
     drivers = [{"joint": "left", "polynomial": [0.0, 0.0, 0.3, -0.1]}, {"joint": "right", "table": rows}]
     run = simulate(twice_driven([0.0], [0.0]).with_(driver=drivers[::order]), times=[0.5, 1.0])
     assert run.outcome.name == "COMPLETED"
-    assert np.allclose(run.position[:, 0, 0], [0.0625, 0.2], atol=1e-11)
+    assert np.allclose(run.position[:, 0, 0], [0.0625, 0.2], atol=1e-11)  # m
 
 
 @pytest.mark.parametrize("further", [0.1, 1e-8])
@@ -77,7 +77,7 @@ def test_drivers_of_a_flat_parallelogram_are_named_unless_both_cranks_turn_alike
     alike = [{"joint": name, "polynomial": [0.0, 0.4]} for name in "AD"]
     scene = parallelogram(0.0, 1.0)
     run = simulate(scene.with_(driver=alike), times=[1.0])
-    assert run.position[0, 1, 1] == pytest.approx(np.sin(0.4), abs=1e-12)
+    assert run.position[0, 1, 1] == pytest.approx(np.sin(0.4), abs=1e-12)  # m
     other = {"joint": "D", "polynomial": [0.0, 0.4, further]}
     with pytest.raises(SceneError, match="the drivers of A and D contradict each other"):
         simulate(scene.with_(driver=[alike[0], other]), times=[1.0])
@@ -119,6 +119,6 @@ def test_contradicting_drivers_of_any_scene_of_an_ensemble_are_named(share, freq
 
     agreed = [scene(1e-12)] * 3
     for run in simulate_all(agreed, "taylor", TIMES, Limits()):
-        assert np.allclose(run.position[:, 0, 0], [0.25, 0.5], atol=1e-9)
+        assert np.allclose(run.position[:, 0, 0], [0.25, 0.5], atol=1e-9)  # m
     with pytest.raises(SceneError, match="the drivers of left and right contradict each other"):
         simulate_all([*agreed, scene(share)], "taylor", TIMES, Limits())

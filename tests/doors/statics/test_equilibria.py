@@ -15,6 +15,7 @@ from tests.helpers.statics import DOWN, ORIGIN, G, hinge, parallelogram, pendulu
 MASS, INERTIA, ARM = 2.0, 0.3, 0.7
 ABOUT_HINGE = INERTIA + MASS * ARM**2
 TORQUE = MASS * G * ARM
+CLOSE = 1e-9  # m, rad, or relative: the search ends at forces of about 1e-12 N
 
 
 def spring(stiffness: float, **fields) -> dict:
@@ -80,7 +81,7 @@ def test_slow_fall_of_a_pendulum_is_found_beside_a_damper_ten_million_times_fast
     rate = np.sqrt(TORQUE / ABOUT_HINGE)
     [upright] = equilibria(fast, starts=1)
     assert upright.stability == "unstable"
-    assert np.abs(upright.eigenvalues - rate).min() < 1e-8 * rate
+    assert np.abs(upright.eigenvalues - rate).min() < 1e-8 * rate  # 15 roundings of 1e7 1/s
     assert np.abs(upright.eigenvalues.real).max() == pytest.approx(1e7, rel=1e-6)
 
 
@@ -90,9 +91,9 @@ def test_both_equilibria_of_a_pendulum_are_found_beside_springs_of_any_stiffness
     found = equilibria(with_slide(stiffness, 0.0, 0.01))
     assert sorted(each.stability for each in found) == ["stable", "unstable"]
     heights = sorted(each.scene.body[0].position[1] for each in found)
-    assert np.allclose(heights, [-ARM, ARM], atol=1e-10)
+    assert np.allclose(heights, [-ARM, ARM], atol=1e-10)  # m
     slow = [np.sort(np.abs(each.eigenvalues))[:2] for each in found]
-    assert np.allclose(slow, np.sqrt(TORQUE / ABOUT_HINGE), rtol=1e-9)
+    assert np.allclose(slow, np.sqrt(TORQUE / ABOUT_HINGE), rtol=CLOSE)
 
 
 @pytest.mark.parametrize("stiffness", [1e4, 1e9])
@@ -105,7 +106,7 @@ def test_two_rods_that_a_spring_of_any_stiffness_straightens_are_found_hanging(s
     scene = Scene(name="rods", gravity=DOWN, body=bodies, joint=joints, load=[spring(stiffness)])
     [found] = equilibria(scene, starts=1)
     assert found.stability == "stable"
-    assert np.allclose(found.scene.body[1].position, (0.0, -1.5, 0.0), atol=1e-9)
+    assert np.allclose(found.scene.body[1].position, (0.0, -1.5, 0.0), atol=CLOSE)
 
 
 @pytest.mark.parametrize("stiffness", [pytest.param(1e3, marks=pytest.mark.slow), 1e7])
@@ -162,7 +163,7 @@ def test_rod_on_a_stiff_slide_along_a_pendulum_is_found_hanging():
     [found] = equilibria(scene, starts=1)
     assert found.stability == "stable"
     depth = 0.8 + 1.5 * G / stiffness
-    assert np.allclose(found.scene.body[2].position, (0.0, -depth - 0.5, 0.0), rtol=0.0, atol=1e-9)
+    assert np.allclose(found.scene.body[2].position, (0.0, -depth - 0.5, 0.0), rtol=0.0, atol=CLOSE)
 
 
 def test_modes_without_the_driver_of_a_pendulum_are_its_free_vibration(tmp_path, capsys):
@@ -209,8 +210,8 @@ def test_spring_wound_by_many_turns_unwinds_to_the_equilibrium_near_its_natural_
         lambda a: TORQUE * np.cos(a) + stiffness * (a - natural), natural - 1, natural + 1, xtol=1e-14
     )
     place = each.scene.body[0].position
-    assert np.allclose(place[:2], (ARM * np.cos(angle), ARM * np.sin(angle)), atol=1e-9)
-    assert each.scene.load[0].natural_angle == pytest.approx(natural - angle, abs=1e-9)
+    assert np.allclose(place[:2], (ARM * np.cos(angle), ARM * np.sin(angle)), atol=CLOSE)
+    assert each.scene.load[0].natural_angle == pytest.approx(natural - angle, abs=CLOSE)
     squares = (stiffness - TORQUE * np.sin(angle)) / ABOUT_HINGE
     assert np.allclose(np.abs(each.eigenvalues) ** 2, squares, rtol=1e-8) and each.stability == "stable"
 
