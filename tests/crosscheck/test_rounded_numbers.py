@@ -86,8 +86,8 @@ def test_engines_accelerate_a_rounded_mechanism_as_the_judge(name):
 
 def test_three_parallel_cranks_need_twelve_digits_to_move():
     """Rounded to 7 digits they are not parallel and locked: the run completes at rest, with a message. With 9
-    digits the rank is uncertain, and the run asks for 12; with 12 digits they move as without rounding, to
-    1e-10 m."""
+    digits the rank is uncertain, and the run asks for 12. With 12 digits they move by more than 0.1 mm, as
+    without rounding to 1e-10 m."""
     runs = {d: simulate(turned("five_bar_gravity", d), "taylor", [0.0, 0.01]) for d in (7, 9, 12, None)}
     outcomes = [run.outcome for run in runs.values()]
     assert outcomes == [Outcome.COMPLETED, Outcome.UNDECIDED, Outcome.COMPLETED, Outcome.COMPLETED]

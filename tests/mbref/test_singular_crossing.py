@@ -108,7 +108,7 @@ def test_flap_on_a_door_that_tilted_hinges_hold_swings_as_on_a_welded_door(tilt)
 
 @pytest.mark.parametrize("inertia", [1e-8, 1e-6])
 def test_small_bead_on_an_arm_swings_without_a_singular_position(inertia):
-    """A pendulum is never singular, however small the bead's inertia (kg m²). It stays 1 m long to rounding."""
+    """A pendulum is never singular, however small the bead's inertia (kg m²). It stays 1 m long."""
     bead = Body(name="bead", mass=1.0, inertia=(inertia,) * 3, position=(1.0, 0.0, 0.0))
     arm = Revolute(name="J", bodies=(GROUND, "bead"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0))
     scene = Scene(name="bead", gravity=(0.0, 0.0, -9.81), body=(bead,), joint=(arm,))

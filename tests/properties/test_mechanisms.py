@@ -106,13 +106,12 @@ def test_joint_that_is_there_twice_counts_as_redundant(scene):
 
 
 @given(mechanisms())
-def test_random_scene_has_velocities_that_its_joints_allow_and_is_read_back_from_its_dictionary(scene):
+def test_random_scene_has_velocities_that_its_joints_allow(scene):
     """Φ_q v = 0 to rounding, by the judge's Jacobian."""
     pose = initial_poses(scene)
     rows, _ = jacobian(scene, 0.0, *pose)
     twists = np.array([[*body.velocity, *body.angular_velocity] for body in scene.body]).ravel()
     assert np.abs(rows @ twists).max(initial=0.0) < 1e-12 * max(1.0, np.abs(twists).max()), scene
-    assert Scene(**scene.to_dict()) == scene
 
 
 @settings(max_examples=6)

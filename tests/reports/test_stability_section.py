@@ -29,8 +29,9 @@ def record(
     }
 
 
-def test_every_scene_of_a_stability_ladder_has_a_closed_form_and_a_name_of_its_place():
-    """A ladder is a mechanism at several difficulties, more than 60 scenes together."""
+def test_name_of_a_scene_of_a_stability_ladder_states_its_ladder_and_difficulty():
+    """A ladder is a mechanism at several difficulties, more than 60 scenes together. Each has a closed
+    form."""
     scenes = stability.scenes()
     assert len(scenes) == sum(len(ladder.rungs) for ladder in stability.ladders()) > 60
     for scene in scenes:

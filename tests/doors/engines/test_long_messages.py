@@ -18,7 +18,8 @@ MOST = 2000  # characters that a message may have
 
 @pytest.mark.parametrize("name", ["TALKATIVE", "FAILING"])
 def test_record_has_the_beginning_of_a_message_of_10_megabytes(name: str, tmp_path: Path):
-    """TALKATIVE gives the text as the run's message, FAILING as the text of an error."""
+    """TALKATIVE gives the text as the run's message, FAILING as the text of an error. A message in a record,
+    or on a line of the file, is shorter than MOST characters, and states the length of the text."""
     case = Case(resting("rest"), TIMES, f"tests.helpers.still_engines:{name}", SETTING)
     [record] = study([case], records_path=tmp_path / "records.jsonl")
     assert LONG[:500] in record["message"] and len(record["message"]) < MOST

@@ -40,8 +40,8 @@ PLACES = """<parent link="b"/><parent_origin xyz="0.3 0 0"/><child link="c"/><ch
     ],
 )
 def test_an_element_that_closes_a_loop_is_a_joint_of_the_scene(files, tag, kind, axes, freedoms):
-    """A parallelogram of links of 0.3 m with the crank at 1.2 rad: the tip is at 0.3 (1 + cos, 0, sin) m. It
-    has the freedoms of its type. The loop is closed to 1e-9 m."""
+    """A parallelogram of links of 0.3 m with the crank at 1.2 rad: the tip is at 0.3 (1 + cos, 0, sin) m, to
+    1e-9 m. The mechanism has one freedom, with a fixed joint none."""
     turn = ' rpy="0 -1.2 0"' if kind == "fixed" else ""
     places = PLACES.replace('<parent_origin xyz="0.3 0 0"', f'<parent_origin xyz="0.3 0 0"{turn}')
     loop = f'<{tag} name="tip" type="{kind}">{places}{axes}</{tag}>'

@@ -111,8 +111,9 @@ def test_two_rods_that_a_spring_of_any_stiffness_straightens_are_found_hanging(s
 
 @pytest.mark.parametrize("stiffness", [pytest.param(1e3, marks=pytest.mark.slow), 1e7])
 def test_chain_that_a_stiff_spring_holds_is_found_in_both_stable_poses(stiffness):
-    """Three rods hang from the origin; a spring holds the middle of the second one. The potential energy is
-    least near the given pose, and near the pose to 10 mm to which scipy comes from the hanging one."""
+    """Three rods hang from the origin; a spring holds the middle of the second one. The truth are two minima
+    of the potential energy, which SciPy's simplex finds from the given and from the hanging pose, to 10
+    mm."""
     lengths, masses, start = np.array([1.0, 1.0, 0.5]), np.array([2.0, 2.0, 1.0]), np.array([0.5, 1.0, 1.5])
 
     def places(angles):
