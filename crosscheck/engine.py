@@ -122,6 +122,7 @@ class Engine(ABC):
         Parameters
         ----------
         scene : Scene
+            The mechanism to simulate.
         """
         return None
 
@@ -132,6 +133,7 @@ class Engine(ABC):
         Parameters
         ----------
         scene : Scene
+            A mechanism that the engine does not refuse.
 
         Returns
         -------
@@ -145,7 +147,9 @@ class Engine(ABC):
         Parameters
         ----------
         scene : Scene
+            The mechanism to simulate.
         family : str
+            Name of a family; an unknown one has no settings.
 
         Returns
         -------
@@ -160,7 +164,9 @@ class Engine(ABC):
         Parameters
         ----------
         scene : Scene
+            The mechanism to simulate.
         family : str
+            Name of a family.
         """
         return bool(self.settings_of(scene, family))
 

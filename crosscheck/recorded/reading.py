@@ -96,7 +96,7 @@ def _cells(path: Path) -> tuple[list[str], list[list[str]]]:
     try:
         headers, *rows = [_split(line, separator) for line in (head, *lines[first:])]
     except csv.Error as error:
-        raise SceneError([f"{path}: {error}"]) from None
+        raise SceneError([f"{path}: is no table of numbers: {error}"]) from None
     if separator == ";":
         rows = [[cell.replace(",", ".") for cell in row] for row in rows]
     count = len(rows[0])

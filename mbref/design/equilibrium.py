@@ -99,8 +99,8 @@ class Equilibrium:
 
     @property
     def oscillating(self) -> np.ndarray:
-        """Numbers (indices from 0) of the eigenvalues with positive imaginary part, slowest vibration
-        first."""
+        """Indices (from 0) of the eigenvalues with positive imaginary part, shape (number of vibrations,),
+        slowest vibration first."""
         return np.flatnonzero(self.eigenvalues.imag > 0.0)
 
     def __repr__(self) -> str:

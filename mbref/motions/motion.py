@@ -54,6 +54,11 @@ class Motion(Trajectory):
             The scene that moves.
         trajectory : Trajectory
             Its motion, with the bodies in any order.
+
+        Returns
+        -------
+        Motion
+            The numbers of the trajectory, with outputs such as ``joint`` and ``energy``.
         """
         return Motion(**{f.name: getattr(trajectory, f.name) for f in fields(Trajectory)}, mechanism=scene)
 
@@ -64,6 +69,11 @@ class Motion(Trajectory):
         ----------
         name : str
             Name of the joint.
+
+        Returns
+        -------
+        JointMotion
+            At the sample times: rad and m since t = 0, rad/s and m/s, N and N m in the world frame.
 
         Raises
         ------
@@ -119,6 +129,11 @@ class Motion(Trajectory):
         joint : str
             Name of the driven joint.
 
+        Returns
+        -------
+        DriverMotion
+            At the sample times: N or N m on the second body, along or about the joint's axis, and W.
+
         Raises
         ------
         KeyError
@@ -133,6 +148,11 @@ class Motion(Trajectory):
         ----------
         place : int
             Index of the load in the scene, from 0.
+
+        Returns
+        -------
+        LoadMotion
+            At the sample times: m or rad, rates per s, N or N m, W and J.
 
         Raises
         ------
@@ -159,7 +179,13 @@ class Motion(Trajectory):
         return determined_reactions(self.mechanism, self)
 
     def to_record(self) -> dict[str, Any]:
-        """Return the record that ``run --json`` prints; ``error_estimate`` is None if none was made."""
+        """Return the record that ``run --json`` prints.
+
+        Returns
+        -------
+        dict
+            As ``Trajectory.to_record``, with ``error_estimate``: a dict, or None if no error was estimated.
+        """
         estimate = self.error_estimate
         return {**super().to_record(), "error_estimate": estimate and estimate.to_record()}
 

@@ -131,7 +131,7 @@ class _OwnRun:
         if multipliers is not None:
             multipliers = _shaped(multipliers, (m,), f"formulation: λ must have the shape ({m},)")
         if not np.isfinite(a).all():
-            raise _End(Outcome.NOT_FINITE, "the accelerations are not finite")
+            raise _End(Outcome.NOT_FINITE, "the accelerations that the formulation returns are not finite")
         return self.frames.principal(a), multipliers
 
     def samples(self, times: np.ndarray) -> Iterator[tuple[float, _Sample]]:
@@ -183,7 +183,7 @@ class _OwnRun:
     def _accept(self, q: np.ndarray, v: np.ndarray) -> None:
         """Take over the state after a step: count turns, stabilise, and check violations; raises _End."""
         if not (np.isfinite(q).all() and np.isfinite(v).all()):
-            raise _End(Outcome.NOT_FINITE, "the state is not finite")
+            raise _End(Outcome.NOT_FINITE, "the state is not finite; try a smaller tolerance")
         poses = q.reshape(-1, 7).copy()
         poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
         self.q, self.v = poses.ravel(), v.copy()

@@ -89,8 +89,9 @@ def simulate(
     SceneError
         If the scene cannot be simulated.
     InputError
-        If times do not increase or are given beside a duration, the integrator does not have the order, or
-        a function returns arrays of other shapes.
+        If times do not increase or are given beside a duration, ``limits.order`` is none of the integrator's,
+        a formulation is given beside a method or a stabilisation without a formulation, or a function returns
+        arrays of other shapes.
     MethodError
         If the method is unknown, has no generated code, or crosses no singular position at which ``limits``
         request a branch.

@@ -76,7 +76,7 @@ def _checked(state: GivenState, model: Model) -> tuple[np.ndarray, np.ndarray]:
     poses = q.reshape(-1, 7)
     lengths = np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
     if not lengths.all():
-        raise InputError("state: a quaternion has no length")
+        raise InputError("state: a quaternion has no length; its four numbers must not all be 0")
     poses[:, 3:] /= lengths
     return q, v
 

@@ -85,7 +85,10 @@ class CompiledRun:
         self._library.open_mechanism.restype = ctypes.c_void_p
         address = self._library.open_mechanism(_pointer(counts), *map(_pointer, tables))
         if not address:
-            raise ValueError(f"Pinocchio refuses the mechanism {mechanism.scene.name}")
+            raise ValueError(
+                f"{mechanism.scene.name}: Pinocchio's C++ library cannot build the mechanism; "
+                "a family without 'compiled' prints its reason"
+            )
         return ctypes.c_void_p(address)
 
     def trajectory(

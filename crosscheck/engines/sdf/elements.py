@@ -87,7 +87,7 @@ def direction(axis: ET.Element | None, name: str, at: Pose, frames: Frames) -> n
     given = np.array([0.0, 0.0, 1.0]) if xyz is None else numbers(xyz, where, 3)
     size = float(np.linalg.norm(given))
     if not size:
-        raise SceneError([f"{where}: has no length"])
+        raise SceneError([f"{where}: has no length; give xyz a direction, such as 0 0 1"])
     expressed = xyz.get("expressed_in") if xyz is not None else None
     turn = at.turn if expressed is None else frames.world(expressed).turn
     return np.asarray(turn @ given / size)

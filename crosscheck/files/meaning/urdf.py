@@ -58,7 +58,8 @@ def meant(root: ET.Element, where: str) -> Machine:
             [f"{where}: joints name links that the file does not have: {', '.join(sorted(unknown))}"]
         )
     if len(roots) != 1 or len(carried) != len(joints):
-        raise SceneError([f"{where}: the links are no tree with one root: {', '.join(roots) or 'no root'}"])
+        found = f"the links are no tree with one root: {', '.join(roots) or 'no root'}"
+        raise SceneError([f"{where}: {found}; give every link but one a joint of which it is the child"])
     places = {roots[0]: ORIGIN}
     waiting = list(joints)
     while ready := [j for j in waiting if ends[str(j.get("name"))][0] in places]:
@@ -67,7 +68,8 @@ def meant(root: ET.Element, where: str) -> Machine:
             places[child] = places[parent].then(_origin(joint))
             waiting.remove(joint)
     if waiting:
-        raise SceneError([f"{where}: joint {waiting[0].get('name')!r} belongs to a circle of links"])
+        name = waiting[0].get("name")
+        raise SceneError([f"{where}: joint {name!r} belongs to a circle of links; URDF cannot close loops"])
     rooted = Joint(f"{roots[0]} fixed", FIXED, (WORLD, roots[0]))
     return Machine(
         bodies=tuple(_body(name, link, places[name]) for name, link in links.items()),
@@ -123,7 +125,7 @@ def _joint(joint: ET.Element, pair: tuple[str, str], places: dict[str, Place]) -
         return Joint(name, kind, pair, anchor)
     axis = _numbers(joint.find("axis"), "xyz", (1.0, 0.0, 0.0))
     if not (size := float(np.linalg.norm(axis))):
-        raise SceneError([f"joint {name!r}: axis has no length"])
+        raise SceneError([f"joint {name!r}: axis has no length; give xyz a direction, such as 0 0 1"])
     if kind == "planar":
         return Joint(name, kind, pair, anchor, at.direction(axis / size))
     limit, dynamics = joint.find("limit"), joint.find("dynamics")

@@ -112,14 +112,19 @@ def default_cases(
     families : sequence of str, optional
         Families of settings. Default: all.
     times : ndarray, shape (k,), optional
-        Sample times, s. Default: SAMPLES equidistant ones over the scene's duration.
+        Sample times, s. Default: 101 equidistant ones over the scene's duration, both ends included.
     time_limit : float
-        CPU time (s) of a run.
+        Largest CPU time of a run, s.
 
     Returns
     -------
     tuple of (list of Case, list of Unable)
         The runs, and the refusals.
+
+    Raises
+    ------
+    LookupError
+        If an engine is unknown; the message lists the known ones.
     """
     scene = started(scene)
     times = np.linspace(0.0, scene.duration, SAMPLES) if times is None else times
