@@ -65,4 +65,4 @@ def test_verify_passes_the_tiny_plug_in_and_lists_the_spatial_scene_that_it_refu
     """Exit status 0: no check of the example engine, which is planar, fails."""
     assert main(["verify", "tiny", "--scene", scene, "--scene", "spatial_slider_crank"]) == 0
     out = capsys.readouterr().out
-    assert "0 fail" in out and "cannot: spatial_slider_crank" in out, out
+    assert re.search(r"\b0 fail", out) and "cannot: spatial_slider_crank" in out, out

@@ -32,7 +32,7 @@ def test_exact_motions_of_a_scene_pass_the_comparison_with_and_without_accelerat
 
 
 def test_a_run_with_missing_samples_is_reported():
-    """A run with one sample, or with none, beside the whole run."""
+    """The second run has one sample, then none."""
     scene = FOUR_BAR
     run = short_run(scene)
     found = gate(scene, [run, short_run(scene, np.zeros(1))])

@@ -172,5 +172,5 @@ def test_first_step_of_newton_has_the_reference_s_accelerations(family, make):
 
 
 def test_every_solver_of_newton_has_a_measured_error():
-    """Except for Featherstone's, which leaves the loop open."""
+    """Featherstone's solver has none, as it leaves the loop open."""
     assert set(ERRORS) | {"featherstone"} == set(FAMILIES)

@@ -11,8 +11,8 @@ from mbref.scenes import SCENES
 
 
 def test_driver_of_a_straight_four_bar_leaves_no_degree_of_freedom():
-    """The rank is lower at this pose; at other poses the mechanism has one degree of freedom, which its
-    driver takes. The counts are of other poses."""
+    """``counts`` counts at other poses, where the mechanism has one freedom, which the driver takes. At the
+    straight pose the rank is lower."""
     scene = SCENES["four_bar_straight"]()
     assert mbref.counts(scene).degrees_of_freedom == 1
     assert undriven_freedoms(scene) == 0

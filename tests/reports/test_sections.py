@@ -62,7 +62,7 @@ def test_every_section_has_its_heading():
 
 
 def test_page_on_comparisons_lists_all_sections_of_a_report_in_their_order():
-    """docs/compare.md."""
+    """The page is docs/compare.md."""
     page = (Path(__file__).parents[2] / "docs" / "compare.md").read_text()
     listed = page.split("## Sections of a report")[1].split("The section `conformance`")[0]
     assert re.findall(r"`(\w+)`", listed) == [*NAMES, "stability", "closed_loops", "paper"]

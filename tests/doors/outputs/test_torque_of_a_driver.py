@@ -176,7 +176,7 @@ def both_driven() -> Scene:
 
 
 @pytest.mark.parametrize("method", ["taylor", "alf-dual+projection"])
-def test_powers_of_two_open_drivers_of_one_freedom_sum_to_that_of_the_motion(method):
+def test_powers_of_two_drivers_of_one_freedom_add_up_to_the_power_of_the_motion(method):
     """The power is J φ'' φ' with J = J₁ + I₁ + n² (J₂ + I₂), φ'' = 2 rad/s², φ' = 2 t rad/s. ``open`` is the
     number of components that equilibrium does not determine: 1 of each, and 0 if A is driven alone."""
     motion = simulate(both_driven(), method, TIMES)
