@@ -26,9 +26,7 @@ OTHER_TICKS = {  # building and stepping (s) of families that read the clock at 
 
 
 @pytest.mark.parametrize(("name", "part"), ENGINES)
-def test_cost_of_a_run_is_cpu_time_of_building_and_of_stepping(
-    name: str, part: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_cost_of_a_run_is_cpu_time_of_building_and_of_stepping(name, part, monkeypatch):
     """By the clock of `ticks`, with the seconds of the module's docstring. A wall clock would give fractions
     of a second, and an interval that counts twice would give more."""
     scene = able(name, driven_arm(), SCENES["planar_slider_crank_gravity"]().with_(duration=0.01))

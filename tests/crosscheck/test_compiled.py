@@ -189,6 +189,12 @@ def apart(first: Trajectory, second: Trajectory) -> float:
     return max(float((abs(a - b) / np.maximum(1.0, abs(b))).max()) for a, b in pairs)
 
 
+def error_of(scene: Scene, run: Trajectory) -> float:
+    """Return the largest error of poses (m, rad) of a run, which must be complete."""
+    assert run.outcome is Outcome.COMPLETED, run.message
+    return measure(scene, run, truth_for(scene))["error"]
+
+
 @pytest.mark.parametrize("name", _named(SMOOTH))
 def test_mujocos_compiled_family_gives_the_true_motion(name: str) -> None:
     """The error exceeds its measured value (table SMOOTH) at most MARGIN times."""
@@ -197,9 +203,7 @@ def test_mujocos_compiled_family_gives_the_true_motion(name: str) -> None:
     scene = SCENES[name]()
     hard = 1e-7 if name == "bennett" else 1e-9
     run = simulate("mujoco", scene, 6, FAMILY, rtol=rtol, min_step=1e-12, beta=beta, hard=hard)
-    assert run.outcome is Outcome.COMPLETED, run.message
-    error = measure(scene, run, truth_for(scene))["error"]
-    assert error < MARGIN * max(measured, ROUNDING), f"{name}: {error:.1e} from the truth"
+    assert error_of(scene, run) < MARGIN * max(measured, ROUNDING)
 
 
 def completed_by_both(family: str, in_python: str, beta: float) -> tuple[Scene, Trajectory, Trajectory]:
@@ -249,17 +253,13 @@ def test_a_failed_run_of_mujocos_compiled_family_has_the_samples_before_its_end(
 
 
 @pytest.mark.parametrize("name", SINGULAR)
-def test_mujocos_projected_compiled_family_gives_the_true_motion_through_singular_positions(
-    name: str,
-) -> None:
+def test_mujocos_projected_compiled_family_gives_the_true_motion_through_singular_positions(name):
     """The error exceeds its measured value (table SINGULAR) at most MARGIN times; joints stay closed."""
     pytest.importorskip("mujoco")
     rtol, shortest, measured = SINGULAR[name]
     scene = SCENES[name]()
     run = simulate("mujoco", scene, 11, PROJECTED, rtol=rtol, min_step=shortest, beta=0.0, hard=1e-9)
-    assert run.outcome is Outcome.COMPLETED, run.message
-    error = measure(scene, run, truth_for(scene))["error"]
-    assert error < MARGIN * measured, f"{name}: {error:.1e} from the truth"
+    assert error_of(scene, run) < MARGIN * measured
     assert violation_series(scene, run).max() < CLOSED
 
 
@@ -280,10 +280,8 @@ def test_newton_on_mujocos_closures_gives_the_true_driven_motion(name: str) -> N
     tolerance, measured = DRIVEN[name]
     scene = SCENES[name]()
     run = simulate("mujoco", scene, 11, NEWTON, tolerance=tolerance, turn=0.6)
-    assert run.outcome is Outcome.COMPLETED, run.message
+    assert error_of(scene, run) < MARGIN * max(measured, ROUNDING)
     exact = truth_for(scene).poses(run.times)
-    error = measure(scene, run, truth_for(scene))["error"]
-    assert error < MARGIN * max(measured, ROUNDING), f"{name}: {error:.1e} from the truth"
     for field in ("velocity", "acceleration"):
         found, wanted = getattr(run, field), getattr(exact, field)
         assert abs(found - wanted).max() < 1e-9 * abs(wanted).max(), field
@@ -345,16 +343,12 @@ def test_pinocchios_compiled_family_gives_the_true_motion(pinocchio: Engine, nam
     rtol, shortest, measured = PINOCCHIO[name]
     scene = SCENES[name]()
     run = simulate("pinocchio", scene, 11, "tuned, compiled", rtol=rtol, min_step=shortest)
-    assert run.outcome is Outcome.COMPLETED, run.message
-    error = measure(scene, run, truth_for(scene))["error"]
-    assert error < MARGIN * max(measured, ROUNDING), f"{name}: {error:.1e} from the truth"
+    assert error_of(scene, run) < MARGIN * max(measured, ROUNDING)
     assert violation_series(scene, run).max() < CLOSED
 
 
 @pytest.mark.parametrize(("family", "python"), [("dop853, compiled", "dop853"), ("tuned, compiled", "tuned")])
-def test_pinocchios_compiled_families_move_every_joint_as_those_in_python(
-    pinocchio: Engine, family: str, python: str
-) -> None:
+def test_pinocchios_compiled_families_move_every_joint_as_those_in_python(pinocchio, family, python):
     """A scene with every joint and with torsion springs, the only loads of these families. Motions differ by
     at most MARGIN times the measured difference (APART)."""
     joints = every_joint()

@@ -120,9 +120,7 @@ def test_polynomials_mbref_and_judge_have_equal_constraints_of_mechanisms(name: 
 
 @pytest.mark.parametrize("kind", KINDS)
 @given(data=st.data())
-def test_polynomials_mbref_and_judge_have_equal_constraints_of_random_joints(
-    kind: type, data: st.DataObject
-) -> None:
+def test_polynomials_mbref_and_judge_have_equal_constraints_of_random_joints(kind, data):
     """Row spaces and least-norm accelerations of three codes, of one joint that a driver may move."""
     is_driven = kind in DRIVABLE and data.draw(st.booleans())
     scene = data.draw(one_joint_scenes(kind, is_driven))

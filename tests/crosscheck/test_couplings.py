@@ -59,7 +59,7 @@ def test_violation_of_a_coupling_is_its_slip_over_the_scene_with_another_ratio()
 
 
 @pytest.mark.parametrize("name", ["sundials", "ondsel", "casadi", "heyoka"])
-def test_engines_without_couplings_and_armatures_refuse_them_by_name(name):
+def test_adapters_without_couplings_and_armatures_refuse_them_by_name(name):
     for scene, part in ((gear_pair(), "coupling 'teeth'"), (pendulum(), "joint 'A' has an armature")):
         refusal = engine(name).cannot(scene)
         assert refusal is not None and refusal.owner is Owner.ADAPTER and part in refusal.reason, refusal

@@ -91,9 +91,7 @@ def test_symbolic_equations_of_a_bead_on_a_turning_rod_have_the_coriolis_force()
         ),
     ],
 )
-def test_no_symbolic_equations_are_derived_for_free_bodies_drivers_and_forces(
-    parts: dict[str, Any], says: str
-) -> None:
+def test_no_symbolic_equations_are_derived_for_free_bodies_drivers_and_forces(parts, says):
     with pytest.raises(ValueError, match=says):
         TreeEquations(crane(**parts))
 
@@ -121,9 +119,7 @@ def forces(
 
 
 @pytest.mark.parametrize(("turns", "angle"), [(0.0, 0.0), (6.0, 2 * math.pi), (-13.0, -4 * math.pi)])
-def test_torsion_spring_of_an_adapter_counts_the_full_turns_of_an_estimated_angle(
-    turns: float, angle: float
-) -> None:
+def test_torsion_spring_of_an_adapter_counts_the_full_turns_of_an_estimated_angle(turns, angle):
     """The pose gives an angle of 0 up to full turns, and the estimate (0, 6 or -13 rad) their number: 0, 1,
     -2. The moment is -k (φ - 0.25) - c φ', less the gyroscopic moment ω × J ω."""
     spring = TorsionSpring(joint="H", stiffness=4.0, damping=0.5, natural_angle=0.25)

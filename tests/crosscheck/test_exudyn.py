@@ -1,7 +1,6 @@
 """Exudyn's runs against truths and closed forms, and its failures at singular positions."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -79,9 +78,7 @@ def angle(scene: Scene, trajectory: Trajectory) -> np.ndarray:
         ("planar_slider_crank_equal", 0.1, "alpha", 1e-4, (2.5e-4, 3.1e-4)),  # through a singular position
     ],
 )
-def test_exudyns_families_move_mechanisms_within_their_measured_errors(
-    name: str, duration: float, family: str, step: float, errors: tuple[float, float]
-):
+def test_exudyns_families_move_mechanisms_within_their_measured_errors(name, duration, family, step, errors):
     """Errors of poses and velocities against the judge's truth; MARGIN allows for other processors."""
     scene = SCENES[name]()
     trajectory = run(scene, np.linspace(0, duration, 11), family, step)
@@ -211,9 +208,7 @@ def test_exudyn_moves_a_driven_scene_without_masses_and_refuses_a_free_one():
     assert np.array_equal(with_mass.position, without.position)
 
 
-def test_exudyn_prints_nothing_and_writes_no_files(
-    capfd: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_exudyn_prints_nothing_and_writes_no_files(capfd, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name, family in (("planar_slider_crank", "defaults"), ("four_bar", "static"), ("four_bar", "tuned")):
         ENGINE.run(SCENES[name](), np.linspace(0, 0.02, 3), Setting(family, {"step": 1e-3}))

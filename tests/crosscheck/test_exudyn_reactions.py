@@ -41,9 +41,7 @@ def needed_wrench(scene: Scene, trajectory: Trajectory) -> np.ndarray:
 
 @pytest.mark.parametrize("bodies", [("ground", "b"), ("b", "ground")])
 @pytest.mark.parametrize(("kind", "driven"), [*UNDRIVEN, *DRIVEN])
-def test_exudyns_reaction_causes_the_acceleration_of_the_body(
-    kind: str, driven: bool, bodies: tuple[str, str]
-):
+def test_exudyns_reaction_causes_the_acceleration_of_the_body(kind, driven, bodies):
     """F = m (a - g), and M = J α + ω × J ω less the applied moment, about the joint's anchor."""
     scene = Scene(
         name="held",

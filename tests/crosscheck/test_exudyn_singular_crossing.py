@@ -28,9 +28,7 @@ SINGULAR = 0.061192068340  # s, where the equal slider-crank's crank has turned 
         ("five_bar", 0.04, 2e-4, (2.6e-13, 8.6e-13)),  # two, driven
     ],
 )
-def test_exudyn_moves_through_singular_positions_within_its_measured_errors(
-    name: str, duration: float, step: float, errors: tuple[float, float]
-):
+def test_exudyn_moves_through_singular_positions_within_its_measured_errors(name, duration, step, errors):
     """Poses by the judge's truth, rates of joints by its equations; at most MARGIN times measured."""
     scene = SCENES[name]()
     run = ENGINE.run(scene, np.linspace(0, duration, 14), Setting("tuned", {"step": step}))

@@ -4,7 +4,6 @@ child processes: CasADi and OpenSim do not share one."""
 import subprocess
 import sys
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -86,15 +85,6 @@ def test_motion_of_generated_code_does_not_depend_on_the_samples(name: str) -> N
 
 
 @pytest.mark.parametrize("name", GENERATORS)
-def test_an_engine_with_generated_code_refuses_an_unknown_family(name: str) -> None:
-    needs(name)
-    simulator, scene = engine(name), SCENES["planar_slider_crank_gravity"]()
-    assert all(simulator.serves(scene, family) for family in simulator.families)
-    with pytest.raises(ValueError, match="no family of settings 'best'"):
-        simulator.run(scene, np.array([0.0]), Setting("best", {"rtol": 1e-6}))
-
-
-@pytest.mark.parametrize("name", GENERATORS)
 @pytest.mark.parametrize(
     ("scene", "reason"),
     [
@@ -104,9 +94,7 @@ def test_an_engine_with_generated_code_refuses_an_unknown_family(name: str) -> N
         ("five_bar_gravity", "depend on each other"),
     ],
 )
-def test_scenes_without_symbolic_equations_are_refused_with_the_reason(
-    name: str, scene: str, reason: str
-) -> None:
+def test_scenes_without_symbolic_equations_are_refused_with_the_reason(name, scene, reason):
     found = engine(name).cannot(SCENES[scene]())
     assert found is not None and found.owner is Owner.ADAPTER and reason in found.reason, found
 
@@ -121,9 +109,7 @@ def test_casadi_refuses_scenes_if_no_c_compiler_is_installed(monkeypatch: pytest
     assert found is not None and found.reason == "no C compiler is installed (no-such-compiler)", found
 
 
-def test_a_file_in_the_cache_is_found_by_its_origin_unless_it_is_damaged(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_in_the_cache_is_found_by_its_origin_unless_it_is_damaged(tmp_path, monkeypatch):
     """The origin is the text from which a file was made; a damaged file has another checksum than stored."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert file_cache.stored("folder", "origin", ".txt") is None
@@ -136,9 +122,7 @@ def test_a_file_in_the_cache_is_found_by_its_origin_unless_it_is_damaged(
     assert file_cache.stored("folder", "origin", ".txt") is None
 
 
-def test_a_compiled_library_in_the_cache_is_used_by_another_process(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_compiled_library_in_the_cache_is_used_by_another_process(tmp_path, monkeypatch):
     """Only the first process imports CasADi, which generates the code; the cache has one library."""
     needs("casadi")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))

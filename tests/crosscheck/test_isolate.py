@@ -102,9 +102,7 @@ def test_an_observed_run_that_hangs_is_killed_with_the_processes_that_it_started
     assert gone(int(pid.read_text())), f"grandchild {pid.read_text()} is still alive"
 
 
-def test_output_and_files_of_an_engine_do_not_reach_the_parent_process(
-    capfd: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_output_and_files_of_an_engine_do_not_reach_the_parent_process(capfd, tmp_path, monkeypatch):
     """The engine CHATTER prints and writes a file into its working folder."""
     monkeypatch.chdir(tmp_path)
     ended = run("CHATTER")

@@ -1,7 +1,5 @@
 """Studies and ensembles whose processes are killed: no record is lost, none is written twice."""
 
-from pathlib import Path
-
 import pytest
 
 from tests import kills
@@ -15,9 +13,7 @@ MOST_REPEATED = 3  # runs not yet stored when a process is killed: two under way
     ("kind", "runs", "times"),
     [*((k, *few) for k, few in FEW.items()), *(pytest.param(k, *WHOLE, marks=pytest.mark.slow) for k in FEW)],
 )
-def test_killed_processes_lose_no_record_and_repeat_no_stored_run(
-    kind: str, runs: int, times: int, tmp_path: Path
-):
+def test_killed_processes_lose_no_record_and_repeat_no_stored_run(kind, runs, times, tmp_path):
     """A study's parent, an engine's child process or an ensemble's worker gets SIGKILL at random moments;
     each record is then there once. A kill makes at most one record CRASHED."""
     found = kills.KINDS[kind](runs, times, tmp_path)

@@ -126,15 +126,10 @@ def test_hinge_with_a_load_keeps_its_coordinate_when_a_loop_is_cut():
     assert len({loaded.coordinate(scene, spring.joint) for spring in springs}) == len(springs)
 
 
-@pytest.mark.parametrize("kind", FACTORS)
-def test_mujoco_moves_loads_over_time_as_the_reference(kind):
+@pytest.mark.parametrize(("of", "kind"), [*(("mujoco", kind) for kind in FACTORS), ("exudyn", "polynomial")])
+def test_engine_moves_loads_over_time_as_the_reference(of, kind):
     """Forces and moments times a polynomial, sine, table or switch; 10 times MEASURED is allowed."""
-    assert differences_over_limits("mujoco", PROBES[f"{kind} loads over time"].with_(duration=0.12)) < 1
-
-
-def test_exudyn_moves_polynomial_loads_over_time_as_the_reference():
-    """10 times the differences of MEASURED are allowed."""
-    assert differences_over_limits("exudyn", PROBES["polynomial loads over time"].with_(duration=0.1)) < 1
+    assert differences_over_limits(of, PROBES[f"{kind} loads over time"].with_(duration=0.1)) < 1
 
 
 def differences_over_limits(name: str, scene: Scene) -> float:

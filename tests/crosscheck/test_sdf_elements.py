@@ -55,9 +55,7 @@ def test_links_without_inertial_and_worlds_without_gravity_get_sdf_s_defaults(tm
         ("</link>", "<velocity_decay/></link>", "damping", "velocity_decay of link 'b'"),
     ],
 )
-def test_link_element_that_changes_the_motion_is_refused_or_left_out(
-    old: str, new: str, kind: str, sentence: str, tmp_path: Path
-) -> None:
+def test_link_element_that_changes_the_motion_is_refused_or_left_out(old, new, kind, sentence, tmp_path):
     """The error and the list of what is left out name the element, the link and the option ``--without``."""
     with pytest.raises(
         SceneError, match=f"{sentence}: it changes the motion; --without {kind} leaves it out"

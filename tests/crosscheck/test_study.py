@@ -125,9 +125,7 @@ def test_run_in_a_child_gives_the_record_of_a_run_here():
 
 
 @pytest.mark.slow
-def test_cluster_of_two_workers_gives_the_records_of_a_serial_study(
-    one_after_the_other: list[dict], tmp_path: Path
-):
+def test_cluster_of_two_workers_gives_the_records_of_a_serial_study(one_after_the_other, tmp_path):
     """Records are returned and stored; except for times and seconds they equal the records of one thread
     here."""
     from distributed import Client, LocalCluster

@@ -168,9 +168,7 @@ DAMAGES = (
     ],
 )
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_damaged_machine_code_is_reported_compiled_again_and_stored(
-    script, pattern, says, damage, tmp_path: Path
-):
+def test_damaged_machine_code_is_reported_compiled_again_and_stored(script, pattern, says, damage, tmp_path):
     """Three processes: the first compiles, the second finds files damaged, the third finds them whole."""
     cache = tmp_path / "cache"
     assert ran(script, tmp_path, cache)[0] == says

@@ -38,9 +38,7 @@ def test_last_record_of_a_key_replaces_earlier_ones(tmp_path: Path):
     assert stored(path)["a"]["value"] == 2
 
 
-def test_lines_that_are_no_records_are_reported_by_number_and_kept(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-):
+def test_lines_that_are_no_records_are_reported_by_number_and_kept(tmp_path, capsys):
     path = tmp_path / "runs.jsonl"
     lines = [
         '{"key": "a"}',

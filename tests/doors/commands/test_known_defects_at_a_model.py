@@ -52,9 +52,7 @@ def test_no_defect_is_reported_without_an_improvement_or_where_its_conditions_ar
 
 
 @pytest.mark.slow
-def test_sparse_jacobian_of_mujoco_4_0_0_is_named_at_a_file_with_several_loops(
-    capsys: pytest.CaptureFixture[str],
-):
+def test_sparse_jacobian_of_mujoco_4_0_0_is_named_at_a_file_with_several_loops(capsys):
     """MuJoCo 4.0.0 factorises the sparse matrix of this file wrongly: one defect, exit status 1. Other
     versions have no defect there, and status 0."""
     status = main(["diagnose", str(CHAINS), "--engine", "mujoco", "--json"])

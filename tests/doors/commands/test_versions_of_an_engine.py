@@ -131,9 +131,7 @@ def test_version_that_does_not_exist_is_refused_with_the_known_versions(four_ver
         (["a==1", "a==2", "--engine", "mujco"], "did you mean 'mujoco'?"),
     ],
 )
-def test_faulty_requests_are_refused_before_anything_is_installed(
-    words: list[str], says: str, capsys: pytest.CaptureFixture[str]
-):
+def test_faulty_requests_are_refused_before_anything_is_installed(words, says, capsys):
     assert main(["versions", *words]) == 2
     assert says in capsys.readouterr().err
 

@@ -7,7 +7,7 @@ from crosscheck.conformance import suite, trial
 from crosscheck.conformance.mechanisms.specimens import Specimen, specimens
 from crosscheck.conformance.runners import InProcess
 from crosscheck.invariants.laws import COLUMNS, cell
-from tests.helpers.low_order_engines import Step, euler, low_order, symplectic_euler
+from tests.helpers.low_order_engines import euler, low_order, symplectic_euler
 
 STEPS = COLUMNS[-1]
 
@@ -33,9 +33,7 @@ def test_cell_names_rounding_failures_and_refusals() -> None:
 
 
 @pytest.mark.parametrize(("step", "status"), [(euler, suite.FAIL), (symplectic_euler, suite.PASS)])
-def test_explicit_euler_feeds_energy_into_a_tumbling_body_and_symplectic_euler_does_not(
-    step: Step, status: str
-) -> None:
+def test_explicit_euler_feeds_energy_into_a_tumbling_body_and_symplectic_euler_does_not(step, status):
     """Both are of order 1, with energy errors of equal size and opposite sign. Check passive allows no
     gain."""
     body = next(each.scene for each in specimens() if each.scene.name == "tumbling body")

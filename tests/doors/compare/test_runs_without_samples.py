@@ -64,9 +64,7 @@ def printed(capsys: pytest.CaptureFixture[str], folder: Path, name: str, *option
     ],
     ids=["run", "tune", "tune to a closure"],
 )
-def test_command_prints_that_no_run_of_a_crashing_engine_completed(
-    command: list[str], says: str, tmp_path: Path, capsys
-):
+def test_command_prints_that_no_run_of_a_crashing_engine_completed(command, says, tmp_path, capsys):
     assert says in " ".join(printed(capsys, tmp_path, *command).split())
 
 

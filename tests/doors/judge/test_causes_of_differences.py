@@ -238,9 +238,7 @@ def cases(explained: bool) -> list[object]:
 
 
 @pytest.mark.parametrize(("scene", "change", "sentence"), cases(explained=True))
-def test_only_explanation_of_a_wrong_table_names_the_change_that_was_made(
-    scene: str, change: Callable[[Scene, Table], Table], sentence: str
-) -> None:
+def test_only_explanation_of_a_wrong_table_names_the_change_that_was_made(scene, change, sentence):
     """The table is the exact motion with one change, such as positions in mm, named in the test's id. The
     explanation has ``sentence`` in it, and without the change less than 1e-4 of the difference remains."""
     found = crosscheck.judge_motion(SCENES[scene](), change(SCENES[scene](), known(scene)))
@@ -250,9 +248,7 @@ def test_only_explanation_of_a_wrong_table_names_the_change_that_was_made(
 
 
 @pytest.mark.parametrize(("scene", "change", "_"), cases(explained=False))
-def test_wrong_table_that_no_single_change_explains_is_off_without_explanation(
-    scene: str, change: Callable[[Scene, Table], Table], _: str
-) -> None:
+def test_wrong_table_that_no_single_change_explains_is_off_without_explanation(scene, change, _):
     """The exact motion is changed by drift, noise or exchanged rows, or more than three changes fit it."""
     found = crosscheck.judge_motion(SCENES[scene](), change(SCENES[scene](), known(scene)))
     assert not found.is_right and not found.explanations

@@ -33,7 +33,7 @@ OFF = {
     "one row": f"{HEAD}\n0,1,1",
 }
 REFUSED = {
-    "a cell of 200 000 digits": (rows("0." + "1" * 200_000, at=2), "field larger than field limit"),
+    "a cell of 200 000 digits": (rows("0." + "1" * 200_000, at=2), "is no table of numbers: field larger"),
     "a cell of 2 000 digits": (rows("0." + "1" * 2_000, at=2), "column 2 of row 3 has 2002 characters"),
     "more than the largest double": (rows("1e999", at=2), "row 3 is not finite"),
     "not a number": (rows("nan", at=2), "row 3 is not finite"),
@@ -106,9 +106,7 @@ def test_random_bytes_are_refused_with_one_sentence_on_the_file(seed: int, tmp_p
     ],
     ids=["mark", "UTF-16", "tabs", "semicolons", "Fortran", "quotes", "lines of Windows"],
 )
-def test_exact_table_is_right_in_encodings_and_formats_of_other_programs(
-    table: bytes, tmp_path: Path
-) -> None:
+def test_exact_table_is_right_in_encodings_and_formats_of_other_programs(table, tmp_path):
     """``rows("0", at=0)`` is the exact motion, the angle 16 t rad and the rate 16 rad/s; 0 means right."""
     assert status(table, tmp_path) == 0
 

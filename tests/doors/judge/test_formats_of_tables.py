@@ -52,9 +52,7 @@ def unit(values: np.ndarray, form: str) -> float:
 
 
 @seeds
-def test_an_exact_table_is_right_in_every_format_and_coarse_rounding_is_stated(
-    seed: int, tmp_path: Path
-) -> None:
+def test_an_exact_table_is_right_in_every_format_and_coarse_rounding_is_stated(seed, tmp_path):
     """The table is part of a reference motion, in a random format. Where the error that the judge allows
     exceeds a thousandth of a column's range, its verdict states to which unit the column is rounded."""
     _, scene, table, form = random_part(seed)
@@ -78,9 +76,7 @@ def test_numbers_wrong_by_half_the_tolerance_are_right_after_rounding(form: str,
 
 
 @seeds
-def test_column_with_one_cell_that_is_ten_units_of_its_last_digit_wrong_is_off(
-    seed: int, tmp_path: Path
-) -> None:
+def test_column_with_one_cell_that_is_ten_units_of_its_last_digit_wrong_is_off(seed, tmp_path):
     """One number of an exact table is changed by ten units of its last digit plus 100 tolerances."""
     rng, scene, table, form = random_part(seed)
     name = str(rng.choice([n for n in table if n != "time"]))
@@ -101,9 +97,7 @@ def test_column_with_one_cell_that_is_ten_units_of_its_last_digit_wrong_is_off(
     ],
     ids=["jumps", "slow", "huge", "even"],
 )
-def test_angles_that_are_not_the_motion_are_off_though_they_have_few_digits(
-    rows: list[str], tmp_path: Path
-) -> None:
+def test_angles_that_are_not_the_motion_are_off_though_they_have_few_digits(rows, tmp_path):
     """The angle of the double pendulum falls from 0; cells such as 0.5 stand for themselves, not for numbers
     rounded to one digit, because tools leave trailing zeros away."""
     path = tmp_path / "run.csv"

@@ -1,7 +1,5 @@
 """Columns of drivers, loads and energies in references, by closed forms and by the balance of power."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
@@ -78,9 +76,7 @@ def machine(seed: int) -> Scene:
     ],
     ids=["disc", "armature", "gear", "both"],
 )
-def test_torque_of_a_driver_is_the_reduced_inertia_times_the_acceleration(
-    scene: Scene, torque: float
-) -> None:
+def test_torque_of_a_driver_is_the_reduced_inertia_times_the_acceleration(scene, torque):
     """M = (J + I + n² J) φ'' with n turns of the second disc; power M φ', kinetic energy M φ. The judge's
     table is exact to rounding."""
     times = np.linspace(0.0, 1.0, 6)
@@ -131,9 +127,7 @@ def test_torque_that_lacks_the_armature_is_off_and_the_armature_is_named() -> No
     ]
 
 
-def test_torque_that_the_mechanism_does_not_determine_is_named_and_not_right(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_torque_that_the_mechanism_does_not_determine_is_named_and_not_right(tmp_path, capsys):
     """Two drivers move one freedom, and the table has the torque of one of them alone."""
     scene = driven(ratio=-1.0)
     scene = scene.with_(driver=[*scene.driver, Driver(joint="B", polynomial=(0.0, 0.0, -RATE / 2))])
