@@ -46,7 +46,7 @@ class Motion(Trajectory):
 
     @staticmethod
     def of(scene: Scene, trajectory: Trajectory) -> Motion:
-        """Return the trajectory of any engine together with its scene.
+        """Return the trajectory of any engine together with its scene, which outputs such as ``joint`` need.
 
         Parameters
         ----------
@@ -54,26 +54,16 @@ class Motion(Trajectory):
             The scene that moves.
         trajectory : Trajectory
             Its motion, with the bodies in any order.
-
-        Returns
-        -------
-        Motion
-            The numbers of the trajectory, with outputs such as ``joint`` and ``energy``.
         """
         return Motion(**{f.name: getattr(trajectory, f.name) for f in fields(Trajectory)}, mechanism=scene)
 
     def joint(self, name: str) -> JointMotion:
-        """Return angle, displacement and reaction of one joint.
+        """Return angle (rad), displacement (m), their rates and the reaction (N, N m) of one joint.
 
         Parameters
         ----------
         name : str
             Name of the joint.
-
-        Returns
-        -------
-        JointMotion
-            At the sample times: rad and m since t = 0, rad/s and m/s, N and N m in the world frame.
 
         Raises
         ------
@@ -122,17 +112,12 @@ class Motion(Trajectory):
         return scene_at(self.mechanism, self, t)
 
     def driver(self, joint: str) -> DriverMotion:
-        """Return force or torque, and power that the driver of a joint supplies.
+        """Return force (N) or torque (N m), and power (W), that the driver of a joint supplies.
 
         Parameters
         ----------
         joint : str
             Name of the driven joint.
-
-        Returns
-        -------
-        DriverMotion
-            At the sample times: N or N m on the second body, along or about the joint's axis, and W.
 
         Raises
         ------
@@ -142,17 +127,12 @@ class Motion(Trajectory):
         return driver_motion(self.mechanism, self, joint)
 
     def load_at(self, place: int) -> LoadMotion:
-        """Return length or angle, rate, force or torque, and power of one load.
+        """Return length (m) or angle (rad), rate, force (N) or torque (N m), and power (W) of one load.
 
         Parameters
         ----------
         place : int
             Index of the load in the scene, from 0.
-
-        Returns
-        -------
-        LoadMotion
-            At the sample times: m or rad, rates per s, N or N m, W and J.
 
         Raises
         ------
@@ -179,13 +159,8 @@ class Motion(Trajectory):
         return determined_reactions(self.mechanism, self)
 
     def to_record(self) -> dict[str, Any]:
-        """Return the record that ``run --json`` prints.
-
-        Returns
-        -------
-        dict
-            As ``Trajectory.to_record``, with ``error_estimate``: a dict, or None if no error was estimated.
-        """
+        """Return the record of ``Trajectory.to_record`` with ``error_estimate``: a dict, or None without an
+        estimate. ``run --json`` prints it."""
         estimate = self.error_estimate
         return {**super().to_record(), "error_estimate": estimate and estimate.to_record()}
 

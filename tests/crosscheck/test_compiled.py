@@ -190,7 +190,7 @@ def apart(first: Trajectory, second: Trajectory) -> float:
 
 
 def error_of(scene: Scene, run: Trajectory) -> float:
-    """Return the largest error of poses (m, rad) of a run, which must be complete."""
+    """Return the largest error of poses (m, rad) of a complete run."""
     assert run.outcome is Outcome.COMPLETED, run.message
     return measure(scene, run, truth_for(scene))["error"]
 
