@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from mbref.scenes import SCENES, find_scene
     from mbref.simulation.second_run import with_error_estimate
     from mbref.simulation.simulate import Limits, simulate
+    from mbref.simulation.sweep import sweep
     from mbref.simulation.terms import terms
 
 __version__ = "0.2.0"
@@ -56,6 +57,7 @@ _PUBLIC = {  # module → its public names
     "scenes": ("SCENES", "find_scene"),
     "simulation.second_run": ("with_error_estimate",),
     "simulation.simulate": ("Limits", "simulate"),
+    "simulation.sweep": ("sweep",),
     "simulation.terms": ("terms",),
 }
 _MODULE_OF = {name: f"mbref.{module}" for module, names in _PUBLIC.items() for name in names}
@@ -92,6 +94,7 @@ __all__ = [
     "plot",
     "simulate",
     "still",
+    "sweep",
     "terms",
     "variants",
     "with_error_estimate",

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal, TypeVar
 
 import numpy as np
@@ -170,6 +170,31 @@ class Method:
         """
         return packed(record(part.numbers(**self.options_of(part)))) if part.options else None
 
+    def with_option(self, name: str, value: float) -> Method:
+        """Return the method with another value of one option.
+
+        Parameters
+        ----------
+        name : str
+            Such as ``"alpha"``, or ``"baumgarte.alpha"`` if two parts have an option of this name.
+        value : float
+            The value, in the option's unit.
+
+        Raises
+        ------
+        MethodError
+            If no part, or more than one, has the option, or the value is not positive.
+        """
+        of_part, _, key = name.rpartition(".")
+        found = [p for p in self.parts if key in p.options and of_part in ("", p.name)]
+        if self.is_series:
+            found = [part for part in found if part is self.integrator]
+        if len(found) != 1:
+            known = [f"{p.name}.{option}" for p in self.parts for option in p.options]
+            raise MethodError(f"{self}: {len(found)} parts have an option {name!r}; known: {_listed(known)}")
+        own = {**self.options.get(found[0].name, {}), key: _checked(found[0].name, key, value)}
+        return replace(self, options={**self.options, found[0].name: own})
+
     @staticmethod
     @functools.lru_cache(maxsize=MOST_NAMES)
     def parse(name: str) -> Method:
@@ -222,12 +247,18 @@ def _part(text: str, table: Mapping[str, Part], kind: str, options: dict[str, di
         if key not in part.options:
             raise MethodError(f"{kind} {name} has no option {key!r}; it has: {_listed(part.options)}")
         try:
-            options.setdefault(name, {})[key] = number = float(value)
+            number = float(value)
         except ValueError:
             raise MethodError(f"{kind} {name}: option {key} must be a number, got {value!r}") from None
-        if not number >= 0 or (key == "step" and number == 0):
-            raise MethodError(f"{kind} {name}: option {key} must be positive, got {value}")
+        options.setdefault(name, {})[key] = _checked(f"{kind} {name}", key, number)
     return part
+
+
+def _checked(part: str, key: str, number: float) -> float:
+    """Return the value of a part's option; raises MethodError if it is negative, or a step is zero."""
+    if not number >= 0 or (key == "step" and number == 0):
+        raise MethodError(f"{part}: option {key} must be positive, got {number:g}")
+    return number
 
 
 def _positional(part: Formulation | Stabilisation | Integrator, position: int) -> str:
@@ -235,5 +266,5 @@ def _positional(part: Formulation | Stabilisation | Integrator, position: int) -
     return names[position] if position < len(names) else f"number {position + 1}"
 
 
-def _listed(options: Mapping[str, float]) -> str:
+def _listed(options: Iterable[str]) -> str:
     return ", ".join(options) or "none"

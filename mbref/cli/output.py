@@ -42,11 +42,11 @@ def warn(scene: Scene) -> None:
         print(f"warning: {slip}", file=sys.stderr)
 
 
-def exit_status(*motions: Motion) -> int:
-    """Print the outcomes of runs that ended early; return 1 if there is one, otherwise 0."""
-    ended = [motion for motion in motions if motion.outcome.name != "COMPLETED"]
-    for motion in ended:
-        print(f"{motion.outcome.name}: {motion.message}")
+def exit_status(motions: Mapping[str, Motion]) -> int:
+    """Print the outcomes of runs that ended early, by label; return 1 if there is one, otherwise 0."""
+    ended = {label: motion for label, motion in motions.items() if motion.outcome.name != "COMPLETED"}
+    for label, motion in ended.items():
+        print(f"{label}: {motion.outcome.name}: {motion.message}".removeprefix(": "))
     return 1 if ended else 0
 
 

@@ -101,7 +101,7 @@ def _animate(options: argparse.Namespace) -> int:
     print(path)
     if not parted and (several := of_several_branches(motion)):
         print(f"{sentence(motion, several[0])}; --branches shows them side by side")
-    return exit_status(*motions.values())
+    return exit_status(motions)
 
 
 def requested_view(options: argparse.Namespace) -> View | None:

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 from mbref.cli.output import exit_status
 from mbref.cli.pictures import path_of
-from mbref.cli.request import add_method_options, add_scene, add_units, request_of
+from mbref.cli.request import Request, add_method_options, add_scene, add_units, request_of
 from mbref.command_line import add_output
 from mbref.files import replaced
 from mbref.input_error import InputError
+from mbref.motions.drawing.plot import plot
 from mbref.motions.outputs import OUTPUTS
+
+if TYPE_CHECKING:
+    from mbref.method import Method
+    from mbref.motions.motion import Motion
 
 COLUMN_LIST = "columns:\n" + "\n".join(f"  {o.column:31} {o.unit:13} {o.meaning}" for o in OUTPUTS)
 
 
 def add(commands: Any) -> None:
     """Add the command's parser."""
-    plot = commands.add_parser(
+    parser = commands.add_parser(
         "plot",
         action=_plot,
         help="numbers of a motion over time as PNG or SVG",
@@ -27,38 +33,72 @@ def add(commands: Any) -> None:
         epilog="examples:\n  mbref plot mechanism.toml\n"
         "  mbref plot four_bar_gravity rocker.position A.angle --out run.png\n"
         '  mbref plot spatial_slider_crank slider.position "driver(A).torque"\n'
-        "  mbref plot four_bar coupler.position.y --over A.angle --units mm,deg\n\n" + COLUMN_LIST,
+        "  mbref plot four_bar coupler.position.y --over A.angle --units mm,deg\n"
+        "  mbref plot mechanism.toml position_violation --method lm1+baumgarte --vary alpha=1,5,25\n\n"
+        + COLUMN_LIST,
     )
-    add_scene(plot)
-    plot.add_argument(
+    add_scene(parser)
+    parser.add_argument(
         "columns",
         nargs="*",
         metavar="COLUMN",
         help="a column or its beginning, such as rod.position (default: joint coordinates and energy)",
     )
-    plot.add_argument(
+    parser.add_argument(
         "--over",
         default="time",
         metavar="COLUMN",
         help="column of the horizontal axis, such as A.angle of a driven joint (default: time)",
     )
-    plot.add_argument("--together", action="store_true", help="one panel for all columns of one unit")
-    add_units(plot)
-    add_output(plot, "--out", metavar="FILE", help=".svg or .png (default: as the scene, with -plot.svg)")
-    add_method_options(plot, json=False)
+    parser.add_argument("--together", action="store_true", help="one panel for all columns of one unit")
+    parser.add_argument(
+        "--vary",
+        action="append",
+        metavar="OPTION=NUMBERS",
+        default=[],
+        help="one curve for each value of an option of the method, such as alpha=1,5,25, or\n"
+        "baumgarte.alpha=1,5 if two parts have it; may be repeated: all combinations",
+    )
+    add_units(parser)
+    add_output(parser, "--out", metavar="FILE", help=".svg or .png (default: as the scene, with -plot.svg)")
+    add_method_options(parser, json=False)
+
+
+def _values(words: Sequence[str]) -> dict[str, list[float]]:
+    """Return the values of ``--vary`` by option; raises InputError for a word without numbers."""
+    try:
+        pairs = [word.split("=") for word in words]
+        return {name: [float(number) for number in numbers.split(",")] for name, numbers in pairs}
+    except ValueError:
+        raise InputError(
+            f"--vary: must be OPTION=NUMBER,…, such as alpha=1,5,25, got {words[-1]!r}"
+        ) from None
+
+
+def _motions(options: argparse.Namespace, run: Request, names: Sequence[str]) -> dict[str, Motion]:
+    """Return the motions to plot by label: one, or one for each value of ``--vary``."""
+    methods: dict[str, Method | str | None] = {"": run.method}
+    if options.vary:
+        if run.method is None:
+            raise InputError("--vary: needs --method, whose options it varies")
+        from mbref.simulation.sweep import methods_of
+
+        methods = dict(methods_of(run.method, _values(options.vary)))
+    check = (lambda first: first.columns(*names)) if names else None
+    return {label: run._replace(method=each).motion(check) for label, each in methods.items()}
 
 
 def _plot(options: argparse.Namespace) -> int:
     path, run = path_of(options, "-plot", (".svg", ".png")), request_of(options)
     over = [] if options.over == "time" else [options.over]
     names = [*options.columns, *over]
-    motion = run.motion((lambda first: first.columns(*names)) if names else None)
+    motions = _motions(options, run, names)
     style = {"over": options.over, "units": options.units or "", "together": options.together}
     try:
-        figure = motion.plot(*options.columns, **style)
+        figure = plot(motions, *options.columns, **style)
     except ImportError:
         raise InputError("a plot needs matplotlib: pip install 'mbref[report]'") from None
     with replaced(path) as fresh:
         figure.savefig(fresh, dpi=150)
     print(path)
-    return exit_status(motion)
+    return exit_status(motions)

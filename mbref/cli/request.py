@@ -98,7 +98,7 @@ class Request(NamedTuple):
     """Arguments of ``simulate``."""
 
     scene: Scene
-    method: str | None  # None for the default
+    method: Method | str | None  # None for the default
     times: np.ndarray  # (k,), s
     limits: Limits
 
@@ -109,7 +109,8 @@ class Request(NamedTuple):
         """
         from mbref.simulation.simulate import are_compiled, prepare, simulate
 
-        method = Method.parse(self.method or default_method(self.scene))
+        method = self.method or default_method(self.scene)
+        method = Method.parse(method) if isinstance(method, str) else method
         if not are_compiled(method):
             prepare(method)
         with progress_bar("simulating", float(self.times[-1])) as progress:
