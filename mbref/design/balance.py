@@ -8,16 +8,16 @@ are compared by these displacements instead of accelerations, so that stiff spri
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from mbref import rotations
 from mbref.design.joint_angles import sprung
-from mbref.design.linearisation import EPSILON, OffConstraints, Tangent
+from mbref.design.linearisation import EPSILON, OffConstraints, Tangent, norms_by_body
 
 STRIDE = 0.35  # distance of neighbouring starts / length of the mechanism, or rad
-LONGEST_STEP = 0.3  # largest step towards an equilibrium / length of the mechanism, or rad
+LONGEST_STEP = 0.3  # largest step of a body towards an equilibrium / length of the mechanism, or rad
 MOST_NEWTON_STEPS = 60  # largest number of Newton steps from a start
 STEP_SHARES = (1.0, 0.5, 0.25, 0.1, 0.02)  # of a Newton step that are tried
 # largest acceleration at an equilibrium / acceleration that the forces on the bodies give without cancelling
@@ -28,6 +28,8 @@ LEAST_GAIN = 0.01  # least relative decrease of the displacement by a whole step
 REFINED = 0.9  # largest ratio of displacements of successive refinements
 UNDECIDED = 1e-4  # largest distance that is tried of an equilibrium without stiffness / length, or rad
 ONE_POSE = 1e-6  # distance / length, or rad, below which two poses are one
+NEAR = 0.1  # distance / length, or rad, below which a Newton step may lead to a known equilibrium
+MISSED = 0.1  # distance from it at the end of this step / distance at its start
 LINKS = 40  # largest number of steps between two poses of one family
 STIFF = 0.05  # displacement by the forces / length, or rad, below which a direction is stiff
 MOST_RETURNS = 12  # largest number of steps along stiff directions from a displaced pose
@@ -40,12 +42,13 @@ class Newton:
         self.tangent, self.off = tangent, tangent.off_balance()
         self.left, self.stiffness, right = np.linalg.svd(tangent.slope())
         self.directions = right.T
-        self.sizes = np.linalg.norm(tangent.basis @ self.directions, axis=0)
-        pushes = np.abs(self.left.T) @ tangent.pushes
+        moves = tangent.basis @ self.directions
+        self.sizes = np.linalg.norm(moves, axis=0)
+        # largest steps (f,): LONGEST_STEP of a body
+        self.longest = LONGEST_STEP / norms_by_body(moves).max(axis=0)
+        pushes = self._pushes(tangent.forces)
         placed = PLACED * self.stiffness / self.sizes
         self.bound, self.rounding = BALANCED * pushes + placed, BALANCE_ROUNDING * pushes + placed / 16
-        # directions (f,) along which the forces on the bodies give a small displacement
-        self.is_stiff = pushes * self.sizes < STIFF * self.stiffness
 
     def parts(self, off: np.ndarray) -> np.ndarray:
         """Return the accelerations (f,) along u of x'' (n,)."""
@@ -56,16 +59,12 @@ class Newton:
         """True at an equilibrium."""
         return bool((np.abs(self.parts(self.off)) <= self.bound).all())
 
-    def displacements(self, off: np.ndarray, longest: float) -> np.ndarray:
-        """Return the displacements (f,) along v that balance x'' (n,), each shorter than a length or rad."""
-        parts, most = self.parts(off), longest / self.sizes
-        return np.asarray(
-            np.sign(parts) * np.minimum(np.abs(parts) / np.maximum(self._least_stiffness(most), 1e-300), most)
-        )
-
-    def _least_stiffness(self, most: np.ndarray) -> np.ndarray:
-        """Return σ (f,), not less than the accelerations at the pose over the largest displacements."""
-        return np.maximum(self.stiffness, np.maximum(np.abs(self.parts(self.off)), self._negligible) / most)
+    @property
+    def _least_stiffness(self) -> np.ndarray:
+        """Sizes σ (f,) of the stiffness, not less than the accelerations at the pose over the largest
+        steps."""
+        least = np.maximum(np.abs(self.parts(self.off)), self._negligible) / self.longest
+        return np.maximum(np.maximum(self.stiffness, least), 1e-300)
 
     @property
     def _negligible(self) -> np.ndarray:
@@ -73,16 +72,16 @@ class Newton:
         return self.rounding if self.is_balanced else self.bound
 
     def step(self) -> np.ndarray:
-        """Return the Newton step y (f,): at most LONGEST_STEP along each direction."""
+        """Return the Newton step y (f,): at most LONGEST_STEP of a body along each direction."""
         parts = self.parts(self.off)
-        moves = -self.displacements(self.off, LONGEST_STEP)
-        return np.asarray(self.directions @ np.where(np.abs(parts) <= self._negligible, 0.0, moves))
+        moves = np.where(np.abs(parts) <= self._negligible, 0.0, -parts / self._least_stiffness)
+        return np.asarray(self.directions @ moves)
 
     def fall(self) -> np.ndarray:
         """Return the step y (f,) with the accelerations, over the sizes of the stiffness."""
-        parts, most = self.directions.T @ self.tangent.coordinates(self.off), LONGEST_STEP / self.sizes
+        parts = self.directions.T @ self.tangent.coordinates(self.off)
         parts = np.where(np.abs(parts) <= self.bound, 0.0, parts)
-        held = np.maximum(self.stiffness, np.abs(parts) / most)
+        held = np.maximum(self.stiffness, np.abs(parts) / self.longest)
         return np.asarray(self.directions @ (parts / np.maximum(held, 1e-300)))
 
     @property
@@ -95,9 +94,7 @@ class Newton:
 
     def level(self, off: np.ndarray) -> float:
         """Return the size of x'' (n,) as a displacement, lengths or rad, by the stiffness of this pose."""
-        held = self._least_stiffness(LONGEST_STEP / self.sizes)
-        parts = np.abs(self.parts(off))
-        return float(np.linalg.norm(parts / np.maximum(held, 1e-300) * self.sizes))
+        return float(np.linalg.norm(self.parts(off) / self._least_stiffness * self.sizes))
 
     def moved(self, y: np.ndarray) -> Tangent | None:
         """Return the tangent at q(y), after a return to the balance of stiff directions; None if no pose on
@@ -105,28 +102,45 @@ class Newton:
 
         A long step along a soft direction leaves this balance by its curvature, as it leaves the constraints.
         """
-        moved, is_stiff, before = self.tangent.moved(y), self.is_stiff, np.inf
-        if moved is None or not is_stiff.any() or moved.freedoms != self.tangent.freedoms:
+        moved, before = self.tangent.moved(y), float(np.linalg.norm(self.tangent.basis @ y))
+        if moved is None or not self.is_stiff.any() or moved.freedoms != self.tangent.freedoms:
             return moved
+        try:
+            near = Newton(moved)
+        except OffConstraints:
+            return moved
+        is_stiff = near.is_stiff_against(self.tangent.forces)
         for _ in range(MOST_RETURNS):
-            parts = self.parts(moved.off_balance())
-            moves = -np.where(is_stiff, parts, 0.0) / np.where(is_stiff, self.stiffness, 1.0)
-            size = float(np.linalg.norm(moves * self.sizes))
+            parts = near.parts(moved.off_balance())
+            moves = -np.where(is_stiff, parts, 0.0) / np.where(is_stiff, near.stiffness, 1.0)
+            size = float(np.linalg.norm(moves * near.sizes))
             if not PLACED < size < REFINED * before:
                 return moved
-            back = moved.moved(moved.coordinates(self.tangent.basis @ (self.directions @ moves)))
+            back = moved.moved(moved.coordinates(near.tangent.basis @ (near.directions @ moves)))
             if back is None or back.freedoms != moved.freedoms:
                 return moved
             moved, before = back, size
         return moved
+
+    @property
+    def is_stiff(self) -> np.ndarray:
+        """Directions (f,) along which the forces on the bodies give a small displacement."""
+        return self.is_stiff_against(self.tangent.forces)
+
+    def is_stiff_against(self, forces: np.ndarray) -> np.ndarray:
+        """Return the directions (f,) along which forces of sizes (2 nb,) give a small displacement."""
+        return np.asarray(self._pushes(forces) * self.sizes < STIFF * self.stiffness)
+
+    def _pushes(self, forces: np.ndarray) -> np.ndarray:
+        """Return the accelerations (f,) along u that forces of sizes (2 nb,) give without cancelling."""
+        return np.asarray(np.abs(self.left.T) @ self.tangent.pushes_of(forces))
 
     def softened(self, y: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """Return a direction y (f,) with less of each direction that a spring holds.
 
         Its part is the displacement by forces on the bodies, of sizes (2 nb,), over a stride, at most one.
         """
-        pushes = (np.abs(self.left.T) @ self.tangent.pushes_of(forces)) * self.sizes
-        free = np.maximum(pushes / STRIDE, self.stiffness.min(initial=np.inf))
+        free = np.maximum(self._pushes(forces) * self.sizes / STRIDE, self.stiffness.min(initial=np.inf))
         share = np.minimum(1.0, free / np.maximum(self.stiffness, 1e-300))
         return np.asarray(self.directions @ (share * (self.directions.T @ y)))
 
@@ -142,17 +156,35 @@ class Newton:
         """Directions (f,) along which a displacement by UNDECIDED leaves the balance."""
         return np.asarray(self.stiffness * UNDECIDED / self.sizes > self.bound)
 
+    def leads_to(self, other: Newton) -> bool:
+        """Return whether the Newton step ends near an isolated equilibrium; a marginal one is approached by
+        half of the way only."""
+        if self.tangent.freedoms != other.tangent.freedoms or not other.is_isolated:
+            return False
+        apart = self.tangent.to(other.tangent)
+        distance = float(np.linalg.norm(apart))
+        if distance > NEAR or _turned(self, other) > np.pi:
+            return False
+        missed = float(np.linalg.norm(self.tangent.basis @ self.step() - apart))
+        return distance < ONE_POSE or missed < MISSED * distance
+
     @property
     def is_isolated(self) -> bool:
         """True if every displacement by UNDECIDED leaves the balance."""
         return bool(self._leaves_balance.all())
 
 
-def balanced(tangent: Tangent, freedoms: int) -> Newton | None:
-    """Return the equilibrium that Newton's method reaches from a pose, refined; None if there is none."""
+def balanced(tangent: Tangent, freedoms: int, known: Sequence[Newton]) -> Newton | None:
+    """Return the equilibrium that Newton's method reaches from a pose, refined; None if there is none.
+
+    A ``known`` equilibrium is returned as soon as a Newton step leads to it.
+    """
     try:
         here = Newton(tangent)
         for _ in range(MOST_NEWTON_STEPS):
+            for other in known:
+                if here.leads_to(other):
+                    return other
             if here.is_balanced:
                 return _refined(here, freedoms)
             ahead = _damped_step(here, freedoms)
@@ -194,7 +226,7 @@ def _refined(here: Newton, freedoms: int) -> Newton:
 
 def are_one(first: Newton, second: Newton) -> bool:
     """Return whether poses between two equilibria are equilibria too, so that both belong to one family."""
-    if np.abs(_spring_angles(first.tangent) - _spring_angles(second.tangent)).max(initial=0.0) > np.pi:
+    if _turned(first, second) > np.pi:
         return False
     here, target, before = first.tangent, second.tangent, np.inf
     for _ in range(LINKS):
@@ -213,10 +245,12 @@ def are_one(first: Newton, second: Newton) -> bool:
     return False
 
 
-def _spring_angles(tangent: Tangent) -> np.ndarray:
-    """Return the angles (k,), rad, of torsion springs; full turns of other joints leave a pose as it is."""
-    model = tangent.model
-    return np.asarray(tangent.angles[model.data.loads.angle[sprung(model)].astype(int)])
+def _turned(first: Newton, second: Newton) -> float:
+    """Return the largest difference of angles, rad, of torsion springs between two poses; full turns of other
+    joints leave a pose as it is."""
+    model = first.tangent.model
+    sprung_angles = model.data.loads.angle[sprung(model)].astype(int)
+    return float(np.abs((first.tangent.angles - second.tangent.angles)[sprung_angles]).max(initial=0.0))
 
 
 def _is_equilibrium(tangent: Tangent, near: Newton) -> bool:

@@ -151,7 +151,7 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
     regular = max(each.conditioning for each in poses)
     found: list[Newton] = []
     for tangent in poses:
-        settled = _settled(tangent, freedoms)
+        settled = _settled(tangent, freedoms, found)
         if settled is not None and not any(_is_known(settled, other) for other in found):
             found.append(settled)
     for settled in fallen(found, first, freedoms, starts - 1):
@@ -183,10 +183,10 @@ def _poses(first: Tangent, freedoms: int, count: int) -> list[Tangent]:
     return [*starts_from(first, freedoms, (count + 1) // 2), *starts_from(relaxed, freedoms, count // 2)]
 
 
-def _settled(tangent: Tangent, freedoms: int) -> Newton | None:
+def _settled(tangent: Tangent, freedoms: int, known: list[Newton]) -> Newton | None:
     """Return the equilibrium that is reached from a start; None if there is none."""
     if tangent.freedoms == freedoms:
-        return balanced(tangent, freedoms)
+        return balanced(tangent, freedoms, known)
     here = Newton(tangent)
     return here if here.is_balanced else None
 

@@ -11,14 +11,15 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from mbref.design.balance import STEP_SHARES, STRIDE, Newton, balanced
+from mbref.design.balance import STRIDE, Newton, balanced
 from mbref.design.joint_angles import slots
 from mbref.design.linearisation import OffConstraints, Tangent
 from mbref.equations.model import Model
 from mbref.scene import SlideSpring, Spring, TorsionSpring
 
 SPRINGS = (Spring, TorsionSpring, SlideSpring)
-MOST_FALLS = 60  # largest number of steps of a fall
+MOST_FALLS = 100  # largest number of steps of a fall
+MOST_HALVINGS = 12  # largest number of times that a step is halved
 ARRIVED = 1e-3  # step, lengths or rad, from which Newton's method goes on
 
 
@@ -31,11 +32,11 @@ def fallen(found: Sequence[Newton], first: Tangent, freedoms: int, count: int) -
     if count < 1:
         return
     hanging = _hanging(first, freedoms)
-    if hanging is not None and (settled := balanced(hanging, freedoms)):
+    if hanging is not None and (settled := balanced(hanging, freedoms, found)):
         yield settled
     for start, _ in zip(_starts(found, [first, hanging], freedoms), range(count), strict=False):
-        end = _end_of_fall(start, freedoms)
-        if end is not None and (settled := balanced(end, freedoms)):
+        end = _end_of_fall(start, freedoms, [each for each in found if each.most_unstable is None])
+        if end is not None and (settled := balanced(end, freedoms, found)):
             yield settled
 
 
@@ -57,19 +58,21 @@ def _hanging(first: Tangent, freedoms: int) -> Tangent | None:
     if len(loads) == len(scene.load):
         return None
     model = Model(scene.with_(load=loads))
-    end = _end_of_fall(Tangent(model, first.q, first.frame, np.zeros(slots(model))), freedoms)
+    end = _end_of_fall(Tangent(model, first.q, first.frame, np.zeros(slots(model))), freedoms, ())
     return end and Tangent(first.model, end.q, first.frame, first.angles, first)
 
 
-def _end_of_fall(tangent: Tangent, freedoms: int) -> Tangent | None:
-    """Return the pose at the end of a fall; None at a singular position."""
+def _end_of_fall(tangent: Tangent, freedoms: int, known: Sequence[Newton]) -> Tangent | None:
+    """Return the pose at the end of a fall, or a pose from which a Newton step leads to a known stable
+    equilibrium; None at a singular position."""
+    share = 1.0
     try:
         here = Newton(tangent)
         for _ in range(MOST_FALLS):
-            if here.is_balanced:
+            if here.is_balanced or any(here.leads_to(other) for other in known):
                 break
             step = here.fall()
-            lower = _lower(here, step)
+            lower, share = _lower(here, step, share)
             if lower is None or lower.freedoms != freedoms:
                 break
             here = Newton(lower)
@@ -80,13 +83,18 @@ def _end_of_fall(tangent: Tangent, freedoms: int) -> Tangent | None:
     return here.tangent
 
 
-def _lower(here: Newton, step: np.ndarray) -> Tangent | None:
-    """Return the pose after a share of a step y (f,) over which the accelerations do work on the whole."""
-    for share in STEP_SHARES:
+def _lower(here: Newton, step: np.ndarray, share: float) -> tuple[Tangent | None, float]:
+    """Return the pose after a share of a step y (f,) over which the accelerations do work, and the next
+    share."""
+    for _ in range(MOST_HALVINGS):
         moved = here.moved(share * step)
-        if moved is None:
-            continue
-        before, after = (here.tangent.coordinates(off) for off in (here.off, moved.off_balance()))
-        if step @ (before + after) > 0.0:
-            return moved
-    return None
+        if moved is not None and _work(here.tangent, moved) > 0.0:
+            return moved, min(2.0 * share, 1.0)
+        share /= 2.0
+    return None, share
+
+
+def _work(start: Tangent, end: Tangent) -> float:
+    """Return the work of the accelerations from a pose to another, by the trapezoidal rule."""
+    way = start.coordinates(start.to(end))
+    return float(way @ start.coordinates(start.off_balance() + end.off_balance()))

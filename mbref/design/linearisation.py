@@ -63,7 +63,7 @@ class Tangent:
             raise SceneError(["body: no mass resists a motion that the joints allow, so it has no vibration"])
         self.basis = free @ (axes * np.sqrt(self.mass / squares))
         inwards = frame.relative(model, q, np.zeros(model.n), np.zeros(model.n)) / model.units
-        self.forces = _norms_by_body(terms.force * model.units) + _norms_by_body(self.weight * inwards)
+        self.forces = norms_by_body(terms.force * model.units) + norms_by_body(self.weight * inwards)
 
     @property
     def freedoms(self) -> int:
@@ -82,7 +82,7 @@ class Tangent:
 
     def pushes_of(self, forces: np.ndarray) -> np.ndarray:
         """Return ``pushes`` for the sizes (2 nb,) of forces on the bodies."""
-        return np.asarray(_norms_by_body(self.basis).T @ forces / self.mass)
+        return np.asarray(norms_by_body(self.basis).T @ forces / self.mass)
 
     def along(self, axes: np.ndarray) -> Tangent:
         """Return the tangent with coordinates along orthonormal directions (f, f) of y."""
@@ -175,7 +175,7 @@ def _directional_derivative(function: Callable[[np.ndarray], np.ndarray], h: np.
     return np.asarray(np.sum(parts, axis=0))
 
 
-def _norms_by_body(x: np.ndarray) -> np.ndarray:
+def norms_by_body(x: np.ndarray) -> np.ndarray:
     """Return the lengths (2 nb, …) of the translational and rotational parts of x (6 nb, …)."""
     return np.asarray(np.linalg.norm(x.reshape(-1, 3, *x.shape[1:]), axis=1))
 

@@ -43,14 +43,14 @@ class Windings:
         last = here
         for start in self._starts(here.tangent, spring, way):
             self.left -= POSES_OF_NEWTON
-            settled = balanced(start, self.freedoms)
+            settled = balanced(start, self.freedoms, self.found)
             if settled is None:
                 continue
             self._add(settled, spring)
             apart = last.tangent.coordinates(last.tangent.to(settled.tangent))
             if ONE_POSE < np.linalg.norm(last.tangent.basis @ apart) < NEIGHBOURS:
                 middle = last.tangent.moved(0.5 * apart)
-                if middle and (third := balanced(middle, self.freedoms)):
+                if middle and (third := balanced(middle, self.freedoms, self.found)):
                     self._add(third, spring)
             last = settled
 

@@ -10,7 +10,7 @@ from mbref import Scene, equilibria
 from mbref.cli.commands import main
 from mbref.scene import Spring
 from tests.helpers import parts
-from tests.helpers.statics import DOWN, ORIGIN, G, hinge, parallelogram, pendulum, rod, slide
+from tests.helpers.statics import DOWN, G, hinge, parallelogram, pendulum, rod, slide
 
 MASS, INERTIA, ARM = 2.0, 0.3, 0.7
 ABOUT_HINGE = INERTIA + MASS * ARM**2
@@ -109,39 +109,88 @@ def test_two_rods_that_a_spring_of_any_stiffness_straightens_are_found_hanging(s
     assert np.allclose(found.scene.body[1].position, (0.0, -1.5, 0.0), atol=CLOSE)
 
 
+def centres(lengths: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Return the centres (k, 3) of rods that hang from the origin, each on the former, at angles from the
+    vertical."""
+    ways = (lengths * np.array([np.sin(angles), -np.cos(angles), 0 * angles])).T
+    return np.cumsum(ways, axis=0) - ways / 2
+
+
+def ends(places: np.ndarray) -> list[np.ndarray]:
+    """Return the origin and the further ends (3,) of the rods with these centres."""
+    found = [np.zeros(3)]
+    for place in places:
+        found.append(2 * place - found[-1])
+    return found
+
+
+def rods(lengths: np.ndarray, masses: np.ndarray, angles: np.ndarray, load: list) -> Scene:
+    """Return the chain of these rods, b0 to bk on hinges J0 to Jk."""
+    places = centres(lengths, angles)
+    anchors = ends(places)[:-1]
+    names = ["ground", *(f"b{k}" for k in range(len(masses)))]
+    return Scene(
+        name="chain",
+        gravity=DOWN,
+        body=[rod(*each) for each in zip(names[1:], places, masses, strict=True)],
+        joint=[hinge(f"J{k}", names[k : k + 2], anchor) for k, anchor in enumerate(anchors)],
+        load=load,
+    )
+
+
 @pytest.mark.parametrize("stiffness", [pytest.param(1e3, marks=pytest.mark.slow), 1e7])
 def test_chain_that_a_stiff_spring_holds_is_found_in_both_stable_poses(stiffness):
     """Three rods hang from the origin; a spring holds the middle of the second one. The truth are two minima
     of the potential energy, which SciPy's simplex finds from the given and from the hanging pose, to 10
     mm."""
     lengths, masses, start = np.array([1.0, 1.0, 0.5]), np.array([2.0, 2.0, 1.0]), np.array([0.5, 1.0, 1.5])
-
-    def places(angles):
-        ways = lengths * np.array([np.sin(angles), -np.cos(angles), 0 * angles])
-        return np.cumsum(ways, axis=1).T - ways.T / 2
-
-    held, fixed = places(start)[1], np.array([0.5, -1.2, 0.0])
+    held, fixed = centres(lengths, start)[1], np.array([0.5, -1.2, 0.0])
     natural = float(np.linalg.norm(held - fixed))
 
     def energy(angles):
-        longer = np.linalg.norm(places(angles)[1] - fixed) - natural
-        return masses @ places(angles)[:, 1] * G + stiffness * longer**2 / 2
+        longer = np.linalg.norm(centres(lengths, angles)[1] - fixed) - natural
+        return masses @ centres(lengths, angles)[:, 1] * G + stiffness * longer**2 / 2
 
-    names, ends = ["ground", "b0", "b1", "b2"], 2 * places(start)
-    anchors = [ORIGIN, ends[0], ends[1] - ends[0]]
-    scene = Scene(
-        name="chain",
-        gravity=DOWN,
-        body=[rod(*each) for each in zip(names[1:], places(start), masses, strict=True)],
-        joint=[hinge(f"J{k}", (names[k], names[k + 1]), anchors[k]) for k in range(3)],
-        load=[
-            Spring(bodies=("ground", "b1"), points=(fixed, held), stiffness=stiffness, natural_length=natural)
-        ],
+    holder = Spring(
+        bodies=("ground", "b1"), points=(fixed, held), stiffness=stiffness, natural_length=natural
     )
-    stable = [e.scene.body[2].position for e in equilibria(scene, starts=2) if e.stability == "stable"]
+    found = equilibria(rods(lengths, masses, start, [holder]), starts=2)
+    stable = [each.scene.body[2].position for each in found if each.stability == "stable"]
     for guess in (start, np.zeros(3)):
         least = minimize(energy, guess, method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-13}).x
-        assert min(np.abs(place - places(least)[2]).max() for place in stable) < 0.01
+        assert min(np.abs(place - centres(lengths, least)[2]).max() for place in stable) < 0.01
+
+
+def test_chain_with_elbows_of_different_stiffness_is_found_after_they_have_straightened():
+    """Springs of 3e6 and 6e7 N m/rad begin 0.15 and 0.47 rad from their natural angles; a spring of 2e4 N/m
+    holds the end. At rest the elbows are rigid to 1e-5 rad, so that two angles remain: scipy's least energy
+    is a stable pose to 0.1 mm."""
+    lengths, masses, start = (
+        np.array([0.8, 0.6, 0.5, 0.7]),
+        np.array([2.0, 1.0, 0.5, 1.5]),
+        np.array([2.1, 3.1, 1.8, 3.0]),
+    )
+    fixed, stiffness, length, natural = np.array([1.3, -1.0, 0.0]), 2e4, 1.3, (0.15, 0.47)
+
+    def bent(free):
+        third = free[1] + start[2] - start[1] + natural[0]
+        return np.array([*free, third, third + start[3] - start[2] + natural[1]])
+
+    def energy(free):
+        places = centres(lengths, bent(free))
+        longer = np.linalg.norm(ends(places)[-1] - fixed) - length
+        return masses @ places[:, 1] * G + stiffness * longer**2 / 2
+
+    least = minimize(energy, start[:2], method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-12}).x
+    elbows = [
+        {"type": "torsion_spring", "joint": f"J{k}", "stiffness": k_phi, "natural_angle": angle}
+        for k, k_phi, angle in zip((2, 3), (3e6, 6e7), natural, strict=True)
+    ]
+    tip = ends(centres(lengths, start))[-1]
+    holder = Spring(bodies=("ground", "b3"), points=(fixed, tip), stiffness=stiffness, natural_length=length)
+    found = equilibria(rods(lengths, masses, start, [*elbows, holder]), starts=2)
+    stable = [each.scene.body[3].position for each in found if each.stability == "stable"]
+    assert min(np.abs(place - centres(lengths, bent(least))[3]).max() for place in stable) < 1e-4
 
 
 def test_rod_on_a_stiff_slide_along_a_pendulum_is_found_hanging():
