@@ -66,6 +66,25 @@ def frames(d: Difference) -> Iterator[Stated]:
     yield f"all bodies: another world frame, turned by {angle:.6g} degrees, origin at ({where}) m", 6, columns
 
 
+def body_components(d: Difference) -> Iterator[Stated]:
+    """Return velocities and accelerations by their components along the axes of the body."""
+    kinds = [k for k in VECTORS if k not in ("position", "orientation")]
+    chosen = [[k] for k in kinds] + [list(pair) for pair in itertools.combinations(kinds, 2)] + [kinds]
+    for bodies, which in itertools.product([d.bodies, *([b] for b in d.bodies)], chosen):
+        if not all(any(n in d.recorded for n in vector_names(b, k)) for b in bodies for k in which):
+            continue
+        columns: dict[str, np.ndarray] = {}
+        for body, kind in itertools.product(bodies, which):
+            q, vector = (
+                np.array([d.whole[n] for n in vector_names(body, k)]).T for k in ("orientation", kind)
+            )
+            inner = rotations.rotate(rotations.conjugate(q), vector)
+            columns |= dict(zip(vector_names(body, kind), inner.T, strict=True))
+        title = "all bodies" if bodies == d.bodies else bodies[0]
+        what = " and ".join(k.replace("_", " ") for k in which)
+        yield f"{title}: {what} along the axes of the body, not of the world", 1, columns
+
+
 def points(d: Difference) -> Iterator[Stated]:
     """Return the columns for another body-fixed point than the centre of mass, and for other body axes, of
     every body."""

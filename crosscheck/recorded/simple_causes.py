@@ -10,7 +10,7 @@ import numpy as np
 from crosscheck.judge.deadline import ask
 from crosscheck.recorded.columns import KNOWN_UNITS, SI, VECTORS, kind_of
 from crosscheck.recorded.explanations import Cause, Columns, Difference, Stated, vector_names
-from crosscheck.recorded.geometric_causes import axes, frames, points
+from crosscheck.recorded.geometric_causes import axes, body_components, frames, points
 from mbref import rotations
 
 WORDS = {
@@ -277,6 +277,7 @@ FAMILIES_OF_CAUSES = (
     _offsets,
     _shifts,
     _clocks,
+    body_components,
     frames,
     points,
     _interpolations,

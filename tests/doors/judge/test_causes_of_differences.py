@@ -1,6 +1,7 @@
 """The cause of a difference is named: a change of the exact motion's table, or of its scene."""
 
 import functools
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -126,15 +127,19 @@ def rows(choose: Callable[[np.ndarray], np.ndarray], *parts: str) -> Callable[[S
     return of
 
 
-def in_body_axes(scene: Scene, table: Table) -> Table:
-    """Angular velocities in axes of the body, as engines compute them."""
-    found = dict(table)
-    for body in scene.body:
-        names = [f"{body.name}.angular_velocity.{a}" for a in "xyz"]
-        q = np.array([table[f"{body.name}.orientation.{a}"] for a in "wxyz"]).T
-        inner = rotations.rotate(rotations.conjugate(q), np.array([table[n] for n in names]).T)
-        found.update(zip(names, inner.T, strict=True))
-    return found
+def in_body_axes(*kinds: str) -> Callable[[Scene, Table], Table]:
+    """Return the change of velocities to components along the axes of the body, as engines compute them."""
+
+    def of(scene: Scene, table: Table) -> Table:
+        found = dict(table)
+        for body, kind in itertools.product(scene.body, kinds):
+            names = [f"{body.name}.{kind}.{a}" for a in "xyz"]
+            q = np.array([table[f"{body.name}.orientation.{a}"] for a in "wxyz"]).T
+            inner = rotations.rotate(rotations.conjugate(q), np.array([table[n] for n in names]).T)
+            found.update(zip(names, inner.T, strict=True))
+        return found
+
+    return of
 
 
 def half_a_step_late(scene: Scene, table: Table) -> Table:
@@ -172,6 +177,7 @@ EVERYWHERE = {
     "axes": (exchanged, "x, y, z hold y, x, z"),
     "velocities of another point": (another_point(moves=False), "a point at (0.1, 0.2"),
     "another point": (another_point(moves=True), "a point at (0.1, 0.2"),
+    "velocities in body axes": (in_body_axes("velocity"), "velocity along the axes of the body"),
     "drift": (drifting, NOTHING),
     "noise": (noisy, NOTHING),
     "shuffled rows": (shuffled, NOTHING),
@@ -195,7 +201,10 @@ SIMULATED = {
     "gravity, angles alone": (angles_alone(heavier), "gravity of"),
 }
 OF_ONE_SCENE = {
-    ("double_pendulum", "body axes"): (in_body_axes, NOTHING),
+    ("double_pendulum", "body axes"): (
+        in_body_axes("velocity", "angular_velocity"),
+        "velocity and angular velocity along the axes of the body",
+    ),
     # five causes explain the two equal angles of a parallelogram
     ("four_bar_gravity", "clock, angles alone"): (angles_alone(faster_clock), NOTHING),
     ("four_bar_gravity", "gravity, angles alone"): (angles_alone(heavier), NOTHING),
