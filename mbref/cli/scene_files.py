@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import shlex
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from mbref.input_error import InputError
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 
-UNMOVED = 1e-12  # m or rad; smaller displacements are not reported
+UNMOVED = 1e-12  # rad, or m over the largest coordinate; smaller displacements are not reported
 
 
 def add(commands: Any) -> None:
@@ -81,20 +82,33 @@ def _assemble(options: argparse.Namespace) -> int:
     from mbref.design.assemble import assemble
 
     scene = find_scene(options.scene)
-    found = assemble(scene, dict(_length(scene, text) for text in options.length))
+    found = assemble(scene, _lengths(scene, options.length))
+    places = [anchor for joint in found.scene.joint for anchor in joint.anchor_pair]
+    least = UNMOVED * max(abs(x) for place in (*places, *(b.position for b in scene.body)) for x in place)
     for pair, (before, after) in found.lengths.items():
         print(f"length {pair}: {before:.6g} m, now {after:.6g} m")
     for name, distance in found.joints.items():
-        if distance > UNMOVED:
+        if distance > least:
             print(f"joint {name}: moved by {distance:.3g} m")
     for name, (distance, angle) in found.bodies.items():
-        if max(distance, angle) > UNMOVED:
+        if distance > least or angle > UNMOVED:
             turned = f", turned by {angle:.3g} rad" if angle > UNMOVED else ""
             print(f"body {name}: moved by {distance:.3g} m{turned}")
     if options.out:
         found.scene.save(options.out)
         print(options.out)
     return 0
+
+
+def _lengths(scene: Scene, texts: Sequence[str]) -> dict[tuple[str, str], float]:
+    """Return the lengths (m) of pairs of joints; raises InputError for a pair that is given twice."""
+    found: dict[tuple[str, str], float] = {}
+    for text in texts:
+        pair, length = _length(scene, text)
+        if pair in found or pair[::-1] in found:
+            raise InputError(f"--length: gives {'-'.join(pair)} twice, with {text!r}")
+        found[pair] = length
+    return found
 
 
 def _length(scene: Scene, text: str) -> tuple[tuple[str, str], float]:
@@ -110,6 +124,9 @@ def _length(scene: Scene, text: str) -> tuple[tuple[str, str], float]:
         length = -1.0
     if not (equals and known and 0 < length < float("inf")):
         raise InputError(f"--length: must be A-B=LENGTH with a positive length in m, got {text!r}")
+    if len(known) > 1 and known is not splits:
+        both = " or ".join(f"{first!r} and {second!r}" for first, second in known)
+        raise InputError(f"--length: {text!r} may be the joints {both}; rename one of them")
     return known[0], length
 
 
