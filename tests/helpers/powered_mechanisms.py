@@ -1,5 +1,6 @@
-"""Random mechanisms with all features that do work, under gravity of any direction: armatures, couplings,
-drivers, loads over time, springs of many turns, point masses and massless links."""
+"""Random mechanisms with all features that do work, under gravity of any direction: armatures, couplings of
+two and more coordinates, drivers, loads over time, periodic tables, springs of many turns, point masses and
+massless links."""
 
 from collections.abc import Iterator
 
@@ -10,20 +11,22 @@ from crosscheck.conformance.mechanisms.parts import triple
 from crosscheck.conformance.mechanisms.random_mechanisms import null_space
 from crosscheck.conformance.mechanisms.random_scenes import REGULAR, with_loads_of_joints
 from crosscheck.judge.gauss_principle import goes_on, rank, rank_of, singular_values
-from mbref.scene import Body, Driver, Joint, Revolute, Scene, Sine, TorsionSpring, Translational
+from mbref.scene import Body, Coupling, Driver, Joint, Revolute, Scene, Sine, TorsionSpring, Translational
 
 Rng = np.random.Generator
 MOST_DRIVERS = 3
+DURATION = 0.1  # s; the period of tables, whose rows are at its thirds
+TRIES = 10  # number of sums of coordinates that are tried
 TURNS = 30.0  # rad; largest natural angle of a torsion spring
 NOTHING = (0.0, 0.0, 0.0)
 AT_REST = {"velocity": None, "angular_velocity": None}
 
 
 def powered_mechanism(seed: int) -> Scene:
-    """Return a mechanism with closed loops, armatures of hinges and slides, and loads of all types. It has a
-    coupling, and up to three drivers, where its freedoms allow them; of two mechanisms one has a point mass
-    on a massless link and a slide with armature, and one the ground as a body. The result depends on the seed
-    only."""
+    """Return a mechanism with closed loops, armatures of hinges and slides, and loads of all types, of which
+    some follow periodic tables. It has a coupling, a sum of three or four coordinates, and up to three
+    drivers, where its freedoms allow them; of two mechanisms one has a point mass on a massless link and a
+    slide with armature, and one the ground as a body. The result depends on the seed only."""
     rng = np.random.default_rng([seed, 11])
     scene = with_loads_of_joints(geared_mechanism(seed), seed, switched=False)
     if seed % 2:
@@ -32,10 +35,11 @@ def powered_mechanism(seed: int) -> Scene:
         name=f"powered_{seed}",
         body=tuple(body.model_copy(update=AT_REST) for body in scene.body),
         gravity=triple(9.81 * rng.normal(size=3)),
-        duration=0.1,
+        duration=DURATION,
         ground="body" if seed % 4 < 2 else "frame",
-        load=tuple(_wound(load, rng) for load in scene.load),
+        load=tuple(_periodic(_wound(load, rng), rng) for load in scene.load),
     )
+    scene = _summed(scene, rng)
     for joint in _likely(scene, rng):
         if len(scene.driver) < MOST_DRIVERS:
             scene = _driven(scene, joint, rng)
@@ -81,6 +85,39 @@ def _wound(load, rng: Rng):
     return load.model_copy(update={"natural_angle": float(angle), "stiffness": float(stiffness)})
 
 
+def _periodic(load, rng: Rng):
+    """Return the load; half of the loads over time also follow a periodic table, which begins before the
+    start."""
+    if not getattr(load, "factor", None) or rng.random() < 0.5:
+        return load
+    times, (a, b, c) = DURATION * (np.arange(4) / 3 - 8 / 3), rng.uniform(-1.0, 1.0, 3)
+    table = tuple(zip(times.tolist(), (a, b, c, a), strict=True))
+    return load.model_copy(
+        update={"factor": load.factor.model_copy(update={"table": table, "periodic": True})}
+    )
+
+
+def _summed(scene: Scene, rng: Rng) -> Scene:
+    """Return the scene with a coupling that sums three or four coordinates; without it if no motion
+    remains."""
+    ends = [(joint.name, kind) for joint in scene.joint for kind in joint.facts.coordinates]
+    for _ in range(TRIES if len(ends) > 2 else 0):
+        joints, kinds = zip(*rng.permutation(ends)[: rng.integers(3, 5)].tolist(), strict=True)
+        ratios = rng.choice([-1.0, 1.0], len(joints)) * rng.uniform(0.3, 3.0, len(joints))
+        sum_ = Coupling(name="sum", joints=joints, ratios=tuple(ratios.tolist()), coordinates=kinds)
+        found = scene.with_(coupling=(*scene.coupling, sum_))
+        if null_space(found).size and _moves(found, scene):
+            return found
+    return scene
+
+
+def _moves(scene: Scene, less: Scene) -> bool:
+    """Return whether the row of another coupling or driver leaves a motion, and is independent of the
+    others."""
+    values, before = singular_values(scene), rank(less)
+    return rank_of(values) == before + 1 and values[before] > REGULAR and goes_on(scene)
+
+
 def _likely(scene: Scene, rng: Rng) -> Iterator[Joint]:
     """Yield joints that may be driven, in random order; half of the time the coupled joints first."""
     joints = [joint for joint in scene.joint if joint.facts.driven and rng.random() < 0.4]
@@ -95,7 +132,5 @@ def _driven(scene: Scene, joint: Joint, rng: Rng) -> Scene:
     wave = Sine(amplitude=amplitude, frequency=frequency, phase=phase)
     start = -amplitude * np.sin(phase), -amplitude * frequency * np.cos(phase)
     driver = Driver(joint=joint.name, polynomial=(*map(float, start), square), sine=wave)
-    before, found = rank(scene), scene.with_(driver=(*scene.driver, driver))
-    values = singular_values(found)
-    moves = rank_of(values) == before + 1 and values[before] > REGULAR and goes_on(found)
-    return found if moves else scene
+    found = scene.with_(driver=(*scene.driver, driver))
+    return found if _moves(found, scene) else scene
