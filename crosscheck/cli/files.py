@@ -123,7 +123,7 @@ def document(file: File, found: Sequence[Reading], tried: Sequence[Advice]) -> d
                     for difference in reading.differences
                 ],
                 "messages": list(reading.messages),
-                "unknown": reading.unknown,
+                "unknown": dict(reading.unknown),
                 "seconds": round(reading.seconds, 3),
                 "machine": None if reading.machine is None else dataclasses.asdict(reading.machine),
             }
@@ -141,8 +141,8 @@ def _show(out: Console, file: File, found: Sequence[Reading], tried: Sequence[Ad
     for reading in found:
         name = f"{reading.reader} {reading.version}"
         out.print(Text(f"{name:20} ", "bold") + Text(verdict(reading), LOOKS[reading.grade]), soft_wrap=True)
-        if reading.unknown and reading.grade != REFUSED:
-            out.print(f"{'':20} mass matrix not compared: {reading.unknown}", soft_wrap=True)
+        for quantity, why in reading.unknown.items():
+            out.print(f"{'':20} {quantity} not compared: {why}", style="dim", soft_wrap=True)
     wrong = [reading for reading in found if reading.differences]
     if wrong:
         out.print(_table(wrong))

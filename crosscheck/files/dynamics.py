@@ -1,71 +1,93 @@
-"""Accelerations of a machine that is a tree of hinges and slides, and their differences from an engine's.
+"""Accelerations and a short motion of a machine of hinges and slides, with its loops and couplings.
 
-M a = -g - c - Σ dₙ v |v|ⁿ - Σ kₙ xⁿ⁺¹: mass matrix M and gravity torques g, dampers d, springs k stretched by
-x, and velocity terms c = Ṁ v - ½ ∂(vᵀ M v)/∂q, from differences of order four of M along the coordinates.
+M a = -g - c - Σ dₙ v |v|ⁿ - Σ kₙ xⁿ⁺¹ + Gᵀλ and G a = -Ġ v: mass matrix M and gravity torques g, dampers d,
+springs k stretched by x, rows G, and velocity terms c = Σ m Jᵀ J̇ v + Rᵀ (I Ṙ v + ω × I ω) of bodies.
 """
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
+from crosscheck.engines.loaders.constrained import accelerations, along
+from crosscheck.engines.loaders.loader import DURATION
 from crosscheck.engines.loaders.machine import FIXED, REVOLUTE, SCALAR, Machine, Vector
-from crosscheck.files.differences import WRONG, Difference
-from crosscheck.files.matching import Match, ending
-from crosscheck.files.statics import Pose, statics_of
+from crosscheck.engines.loaders.posed import Pose, Posed
+from crosscheck.files.constraints import closed, projected, rows_of, scales, unknown
+from crosscheck.files.statics import moving_bodies, statics_of
 
 SPEED, SEED = 1.0, 11  # largest rates: rad/s, and machine's sizes per s
-MOST = 30  # joints; the differences of M need four evaluations for each joint
-UNUSED = ("read, and not used by its dynamics", "read, and used by its dynamics in the first number only")
-STEP = 1e-3  # rad or m, of the differences, whose error is about STEP^4
-NONE = (0.0, 0.0, 0.0)  # m/s²
-FACTORS = ((-2.0, 1 / 12), (-1.0, -8 / 12), (1.0, 8 / 12), (2.0, -1 / 12))  # displacement / STEP, weight
-
-
-def moves_alone(machine: Machine) -> bool:
-    """Return whether the machine is a tree of at most MOST hinges and slides."""
-    moving = [joint for joint in machine.joints if joint.type != FIXED]
-    is_tree = not machine.loops and not machine.couplings
-    return is_tree and 0 < len(moving) <= MOST and all(joint.type in SCALAR for joint in moving)
-
-
-def random_rates(machine: Machine, size: float, number: int) -> list[Pose]:
-    """Return random rates of the joints, one set for each of several poses."""
-    random = np.random.default_rng(SEED)
-    joints = [joint for joint in machine.joints if joint.type in SCALAR]
-    most = {joint.name: SPEED if joint.type == REVOLUTE else SPEED * size for joint in joints}
-    return [{n: float(random.uniform(-m, m)) for n, m in most.items()} for _ in range(number)]
+MOST = 60  # joints; the motion of a machine with more takes seconds
+REGULAR = 1e-4  # smallest singular value of independent rows / largest one, away from singular positions
+RTOL = 1e-9  # relative tolerance of the motion
 
 
 class State(NamedTuple):
-    """Displacements and rates of joints, with mass matrix (n, n) and -g - c (n,) of the machine."""
+    """Displacements and rates of joints, with mass matrix (n, n), -g - c (n,), rows G (m, n) and Ġ v (m,)."""
 
     pose: Pose
     rates: Pose
     joints: tuple[str, ...]
     mass: np.ndarray
     force: np.ndarray
+    rows: np.ndarray
+    drift: np.ndarray
+
+
+def closed_poses(machine: Machine, poses: Sequence[Pose], size: float) -> list[Pose]:
+    """Return the poses near to random ones that obey loops and couplings; singular positions are left out."""
+    if not (machine.loops or machine.couplings) or unknown(machine):
+        return []
+    found = [pose for pose in (closed(machine, pose, size) for pose in poses) if pose is not None]
+    ranks = [_rank(machine, pose, size) for pose in found]
+    return [pose for pose, rank in zip(found, ranks, strict=True) if rank and rank == max(ranks)]
+
+
+def _rank(machine: Machine, pose: Pose, size: float) -> int:
+    """Return the rank of the rows; 0 if it is not clear."""
+    rows = rows_of(machine, pose, size)
+    values = np.linalg.svd(rows.of(rows.joints) * scales(machine, size), compute_uv=False)
+    rank = int(np.sum(values > REGULAR * values[0]))
+    return rank if rank == np.sum(values > REGULAR**2 * values[0]) else 0
 
 
 def states_of(machine: Machine, poses: Sequence[Pose], size: float, gravity: Vector) -> list[State]:
-    """Return a state with random rates at each pose; none for a machine that does not move alone."""
-    if not moves_alone(machine):
+    """Return a state with random rates at each pose; none for a machine with other joints than hinges and
+    slides, or with constraints whose rows are unknown."""
+    moving = [joint for joint in machine.joints if joint.type != FIXED]
+    if not 0 < len(moving) <= MOST or any(joint.type not in SCALAR for joint in moving) or unknown(machine):
         return []
-    rates = random_rates(machine, size, len(poses))
-    return [_state(machine, pose, speed, gravity) for pose, speed in zip(poses, rates, strict=True)]
+    random, held = np.random.default_rng(SEED), bool(machine.loops or machine.couplings)
+    most = {joint.name: SPEED if joint.type == REVOLUTE else SPEED * size for joint in moving}
+    found = []
+    for pose in closed_poses(machine, poses, size) if held else poses:
+        rates = {name: float(random.uniform(-m, m)) for name, m in most.items()}
+        rates = projected(machine, pose, rates, size) if held else rates
+        found.append(state_at(machine, pose, rates, size, gravity))
+    return found
 
 
-def _state(machine: Machine, pose: Pose, rates: Pose, gravity: Vector) -> State:
+def state_at(machine: Machine, pose: Pose, rates: Pose, size: float, gravity: Vector) -> State:
+    """Return the state of a machine with its terms."""
     found = statics_of(machine, pose, gravity)
     v = np.array([rates[name] for name in found.joints])
-    slopes = [_slope(machine, pose, name) for name in found.joints]
-    change = sum(rate * slope for rate, slope in zip(v, slopes, strict=True))
-    force = -np.array(found.gravity) - change @ v + np.array([v @ slope @ v for slope in slopes]) / 2
-    return State(pose, rates, found.joints, np.array(found.mass), force)
+
+    def twists(at: Pose) -> np.ndarray:
+        return np.array([body.columns @ v for body in moving_bodies(machine, Posed(machine, at))])
+
+    def rows(at: Pose) -> np.ndarray:
+        return rows_of(machine, at, size).of(found.joints)
+
+    force, drifts = -np.array(found.gravity), along(twists, pose, rates)
+    for body, drift in zip(moving_bodies(machine, Posed(machine, pose)), drifts, strict=True):
+        spin = body.columns[3:] @ v
+        moment = body.inertia @ drift[3:] + np.cross(spin, body.inertia @ spin)
+        force -= body.columns.T @ np.concatenate([body.mass * drift[:3], moment])
+    change = along(lambda at: rows(at) @ v, pose, rates)
+    return State(pose, rates, found.joints, np.array(found.mass), force, rows(pose), change)
 
 
 def accelerations_of(machine: Machine, state: State) -> dict[str, float]:
@@ -76,51 +98,19 @@ def accelerations_of(machine: Machine, state: State) -> dict[str, float]:
         stretched = state.pose[name] + (joint.reference or 0.0) - (joint.rest or 0.0)
         force[k] -= sum(d * v * abs(v) ** n for n, d in enumerate(joint.damping or ()))
         force[k] -= sum(c * stretched ** (n + 1) for n, c in enumerate(joint.stiffness or ()))
-    return dict(zip(state.joints, np.linalg.solve(state.mass, force).tolist(), strict=True))
+    found = accelerations(state.mass, force, state.rows, state.drift)
+    return dict(zip(state.joints, found.tolist(), strict=True))
 
 
-def _slope(machine: Machine, pose: Mapping[str, float], name: str) -> np.ndarray:
-    """Return the derivative of the mass matrix by a coordinate."""
-    parts = [
-        weight / STEP * np.array(statics_of(machine, {**pose, name: pose[name] + factor * STEP}, NONE).mass)
-        for factor, weight in FACTORS
-    ]
-    return np.asarray(sum(parts))
+def end_of(machine: Machine, start: State, size: float, gravity: Vector) -> dict[str, float]:
+    """Return the displacements of joints after ``DURATION``, by DOP853."""
+    names, number = start.joints, len(start.joints)
 
+    def change(_: float, y: np.ndarray) -> np.ndarray:
+        pose, rates = (dict(zip(names, half.tolist(), strict=True)) for half in np.split(y, 2))
+        found = accelerations_of(machine, state_at(machine, pose, rates, size, gravity))
+        return np.concatenate([y[number:], [found[name] for name in names]])
 
-def of_dynamics(
-    match: Match, own: Sequence[Mapping[str, float]], states: Sequence[State], tolerance: float
-) -> list[Difference]:
-    """Return the largest difference of accelerations, relative to the largest acceleration.
-
-    If they are the accelerations without dampers or springs, or with the linear ones alone, the numbers of
-    these are returned.
-    """
-    size, found = _worst(match.file, own, states)
-    if found is None or size <= tolerance:
-        return []
-    for field, (kept, words) in itertools.product(("damping", "stiffness"), enumerate(UNUSED)):
-        having = [joint for joint in match.file.joints if len(getattr(joint, field) or ()) > kept]
-        less: dict[str, Any] = {j.name: {field: getattr(j, field)[:kept]} for j in having}
-        joints = tuple(replace(joint, **less.get(joint.name, {})) for joint in match.file.joints)
-        if having and _worst(replace(match.file, joints=joints), own, states)[0] <= tolerance:
-            return [Difference(WRONG, "joint", j.name, field, getattr(j, field), words) for j in having]
-    return [found]
-
-
-def _worst(
-    machine: Machine, own: Sequence[Mapping[str, float]], states: Sequence[State]
-) -> tuple[float, Difference | None]:
-    """Return the largest relative difference of accelerations; none if the reader lacks a joint."""
-    pairs: list[tuple[str, float, float]] = []
-    for found, state in zip(own, states, strict=False):
-        named = {ending(name): value for name, value in found.items()}
-        expected = accelerations_of(machine, state)
-        if expected.keys() - named.keys():
-            return 0.0, None
-        pairs += [(name, value, named[name]) for name, value in expected.items()]
-    if not pairs:
-        return 0.0, None
-    scale = max(abs(value) for _, *both in pairs for value in both) or 1.0
-    name, value, other = max(pairs, key=lambda pair: abs(pair[2] - pair[1]))
-    return abs(other - value) / scale, Difference(WRONG, "motion", name, "acceleration", value, other)
+    y = np.array([part[name] for part in (start.pose, start.rates) for name in names])
+    run = solve_ivp(change, (0.0, DURATION), y, method="DOP853", rtol=RTOL, atol=RTOL)
+    return dict(zip(names, run.y[:number, -1].tolist(), strict=True))

@@ -4,29 +4,34 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 from crosscheck.engines.loaders import loader
-from crosscheck.engines.loaders.loader import Built, Loader, built
-from crosscheck.engines.loaders.machine import Machine, Vector
+from crosscheck.engines.loaders.loader import Asked, Built, Loader, built
+from crosscheck.engines.loaders.machine import Machine
 from crosscheck.files.differences import Difference, of_reading
-from crosscheck.files.dynamics import State, of_dynamics, states_of
-from crosscheck.files.matching import matched
+from crosscheck.files.dynamics import State, accelerations_of, closed_poses, end_of, states_of
+from crosscheck.files.dynamics_differences import Values, of_rows, of_values
+from crosscheck.files.matching import Match, ending, matched
 from crosscheck.files.meaning import form_of, meant
 from crosscheck.files.merged import size_of
-from crosscheck.files.statics import Pose, poses
+from crosscheck.files.statics import poses
 from crosscheck.files.statics_differences import of_statics
 from crosscheck.processes.child import Child, ChildFailed
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s², of gravity torques where the file has no gravity
+MOVED = 1e-3  # of the largest displacement; engines that have the file's machine differ by less than 1e-4
 WITHOUT_MOTION = ("limits", "friction", "gravity", "reference")  # fields on which accelerations do not depend
 WITHOUT_STATICS = {  # fields on which neither mass matrix nor gravity torques depend
     *("limits", "friction", "damping", "stiffness", "rest", "reference", "pitch"),
     *("coupling", "law", "loop", "gravity"),
 }
+CONSTRAINTS = {"coupling", "law", "loop"}  # fields on which rows depend, besides places and axes
+ROWS = 1e-6  # rad, between spaces of rows; poses obey loops within 1e-11
 COLOURS = re.compile(r"(?:\x1b|\\x1b)\[[0-9;]*m")  # escape sequences of terminals
 Say = Callable[[str], None]
 
@@ -43,24 +48,49 @@ class Reader:
 
 @dataclass(frozen=True)
 class File:
-    """A file with its format, its meaning, and the poses, states and gravity at which engines are asked.
+    """A file with its format, its meaning, and what engines are asked.
 
-    ``states`` are empty unless the machine is a tree of hinges and slides.
+    ``states`` are those of ``asked`` with the machine's terms; the motion begins at the last one.
     """
 
     path: Path
     form: str
     machine: Machine
-    poses: Sequence[Pose]
+    asked: Asked
     states: Sequence[State]
-    gravity: Vector
+
+    @property
+    def size(self) -> float:
+        """Return the machine's size, m."""
+        return size_of(self.machine)
+
+    def accelerations(self, machine: Machine) -> Values:
+        """Return the accelerations of a machine at each state."""
+        return [accelerations_of(machine, state) for state in self.states]
+
+    def moved(self, machine: Machine) -> Values:
+        """Return the displacements of joints of a machine during the motion from the last state."""
+        return self._moved if machine == self.machine else self._ends(machine)
+
+    @cached_property
+    def _moved(self) -> Values:
+        return self._ends(self.machine)
+
+    def _ends(self, machine: Machine) -> Values:
+        ends = [end_of(machine, start, self.size, self.asked.gravity) for start in self.states[-1:]]
+        return [since(start.pose, end) for start, end in zip(self.states[-1:], ends, strict=True)]
+
+
+def since(start: Mapping[str, float], end: Mapping[str, float]) -> dict[str, float]:
+    """Return displacements from the start of a motion; names may begin with a model's."""
+    return {name: value - start.get(ending(name), 0.0) for name, value in end.items()}
 
 
 @dataclass(frozen=True)
 class Reading:
     """A reader's result: version, machine and differences, or the reason of a refusal.
 
-    ``messages`` are lines that the reader printed, and ``unknown`` is why its statics are not compared.
+    ``messages`` are lines that the reader printed, and ``unknown`` is why a quantity is not compared.
     ``convention`` is a choice that the format leaves open, in a sentence.
     """
 
@@ -70,8 +100,8 @@ class Reading:
     differences: tuple[Difference, ...]
     refusal: str
     messages: tuple[str, ...]
-    unknown: str
     seconds: float
+    unknown: Mapping[str, str] = field(default_factory=dict)
     convention: str = ""
 
     @property
@@ -88,10 +118,12 @@ def file_of(path: Path) -> File:
     """Return a file with its meaning; raises SceneError for a faulty file, OSError."""
     form = form_of(path)
     machine = meant(path, form)
-    size = size_of(machine)
-    asked = poses(machine, size)
-    gravity = machine.gravity or GRAVITY
-    return File(path, form, machine, asked, states_of(machine, asked, size, gravity), gravity)
+    size, gravity = size_of(machine), machine.gravity or GRAVITY
+    random = poses(machine, size)
+    states = states_of(machine, random, size, gravity)
+    pairs = [(state.pose, state.rates) for state in states]
+    asked = Asked(random, closed_poses(machine, random, size), pairs, pairs[-1:], gravity)
+    return File(path, form, machine, asked, states)
 
 
 def read(reader: Reader, file: File, time_limit: float) -> Reading:
@@ -103,47 +135,53 @@ def read(reader: Reader, file: File, time_limit: float) -> Reading:
 def read_in(child: Child, reader: Reader, file: File, time_limit: float) -> Reading:
     """Return the reading of a file in a child process, which has ended if the file is refused."""
     began, of_reader = time.monotonic(), loader(reader.name)
-    rates = [state.rates for state in file.states]
-    asked = reader.name, file.path.resolve(), file.form, file.poses, rates, file.gravity
+    asked = reader.name, file.path.resolve(), file.form, file.asked
     try:
         seen = child.call(_built, asked, time_limit)
     except ChildFailed as failure:
         version = of_reader.installed() if reader.python is None else of_reader.version
         said = " ".join(COLOURS.sub("", str(failure)).split())
         reason = re.sub(r"^(?:[\w.]*\bSceneError: |(?:\w+\.)+(?=\w+: ))", "", said)
-        return Reading(of_reader.name, version, None, (), reason, (), "", time.monotonic() - began)
+        return Reading(of_reader.name, version, None, (), reason, (), time.monotonic() - began)
     return _compared(of_reader, file, seen.value, seen.printed, time.monotonic() - began)
 
 
-def _built(
-    name: str, path: Path, form: str, asked: Sequence[Pose], rates: Sequence[Pose], gravity: Vector
-) -> Built:
+def _built(name: str, path: Path, form: str, asked: Asked) -> Built:
     """Return what a loader built; called in the child."""
-    return built(loader(name), path, form, asked, rates, gravity)
+    return built(loader(name), path, form, asked)
 
 
 def _compared(of_reader: Loader, file: File, found: Built, printed: str, seconds: float) -> Reading:
-    match, tolerance = matched(file.machine, found.machine, of_reader.tolerance), of_reader.tolerance
-    reading = of_reading(match, tolerance)
-    statics = of_statics(match, found.statics, file.poses, file.gravity, tolerance)
-    explained = [difference for difference in reading if difference.field not in WITHOUT_STATICS]
+    match = matched(file.machine, found.machine, of_reader.tolerance)
     lines = [line.strip() for line in COLOURS.sub("", printed).splitlines() if line.strip()]
     messages = (*found.machine.messages, *lines)
-    differences = [*reading, *([] if explained else statics)]  # numbers of statics follow from these
-    if all(difference.field in WITHOUT_MOTION for difference in differences):
-        differences += of_dynamics(match, found.accelerations, file.states, tolerance)
-    machine = replace(found.machine, messages=messages)
     return Reading(
         of_reader.name,
         found.version,
-        machine,
-        tuple(differences),
+        replace(found.machine, messages=messages),
+        tuple(differences(match, file, found, of_reader.tolerance)),
         refusal="",
         messages=messages,
-        unknown=found.fault,
         seconds=seconds,
+        unknown=found.faults,
         convention=of_reader.convention,
     )
+
+
+def differences(match: Match, file: File, found: Built, tolerance: float) -> list[Difference]:
+    """Return the differences of what was read, and of the engine's answers that do not follow from these."""
+    reading, asked = of_reading(match, tolerance), file.asked
+    read = {difference.field for difference in reading}
+    if read <= WITHOUT_STATICS:
+        reading += of_statics(match, found.statics, asked.poses, asked.gravity, tolerance)
+    if read <= WITHOUT_STATICS - CONSTRAINTS:
+        reading += of_rows(match, found.rows, asked.closed, max(tolerance, ROWS))
+    if all(difference.field in WITHOUT_MOTION for difference in reading):
+        reading += of_values(match, found.accelerations, file.accelerations, "acceleration", tolerance)
+    if all(difference.field in WITHOUT_MOTION for difference in reading):
+        ends = [since(pose, end) for (pose, _), end in zip(asked.starts, found.ends, strict=False)]
+        reading += of_values(match, ends, file.moved, "displacement", MOVED)
+    return reading
 
 
 def readings(file: File, readers: Sequence[Reader], time_limit: float, say: Say, done: Say) -> list[Reading]:

@@ -13,7 +13,7 @@ from crosscheck.files.corpus import CASES
 from crosscheck.files.corpus.case import Case
 from crosscheck.files.differences import LOST, Difference
 from crosscheck.files.readers import found_readers
-from crosscheck.files.reading import Reader, Reading, file_of, read_in
+from crosscheck.files.reading import File, Reader, Reading, file_of, read_in
 from crosscheck.files.words import is_announced, sentences
 from crosscheck.processes.child import Child
 from mbref.records import looked_at
@@ -41,35 +41,34 @@ def measured(
     """
     found: list[Record] = []
     with TemporaryDirectory(prefix="crosscheck-") as folder:
-        for case in CASES:
-            (Path(folder) / case.form).mkdir(exist_ok=True)
-            _path(folder, case).write_text(case.text)
         for form in dict.fromkeys(case.form for case in CASES):
             readers, _ = found_readers(names, form, install)
+            files = [(case, _written(folder, case)) for case in CASES if case.form == form]
             for reader in readers:
-                found += _of_reader(
-                    reader, [c for c in CASES if c.form == form], folder, time_limit, progress
-                )
+                found += _of_reader(reader, files, time_limit, progress)
     return found
 
 
-def _path(folder: str, case: Case) -> Path:
-    return Path(folder) / case.form / case.file
+def _written(folder: str, case: Case) -> File:
+    path = Path(folder) / case.form / case.file
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(case.text)
+    return file_of(path)
 
 
 def _of_reader(
-    reader: Reader, cases: Sequence[Case], folder: str, limit: float, progress: Callable[[str], None]
+    reader: Reader, files: Sequence[tuple[Case, File]], limit: float, progress: Callable[[str], None]
 ) -> list[Record]:
-    found, waiting, usual = list[Record](), list(cases), set[tuple[str, ...]]()
+    found, waiting, usual = list[Record](), list(files), set[tuple[str, ...]]()
     while waiting:
         with closing(Child(reader.python)) as child:  # for files in turn, until one of them ends it
             while waiting and child.is_alive:
-                case = waiting.pop(0)
-                reading = read_in(child, reader, file_of(_path(folder, case)), limit)
-                if case is cases[0]:
+                case, file = waiting.pop(0)
+                reading = read_in(child, reader, file, limit)
+                if case is files[0][0]:
                     usual = {_signature(difference) for difference in reading.differences}
-                record = _record(case, reading, set() if case is cases[0] else usual)
-                found.append(record | {"words": record["words"].replace(f"{folder}/{case.form}/", "")})
+                record = _record(case, reading, set() if case is files[0][0] else usual)
+                found.append(record | {"words": record["words"].replace(f"{file.path.parent}/", "")})
                 progress(f"{reader.name}: {case.form} {case.name}: {found[-1]['status']}")
     return found
 

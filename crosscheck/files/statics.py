@@ -6,28 +6,25 @@ centre of mass and R of rotation, and the gravity γ.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from crosscheck.engines.loaders.machine import (
-    FIXED,
     REVOLUTE,
     SCALAR,
-    WORLD,
     Coupling,
-    Joint,
     Machine,
     Statics,
     Vector,
     matrix,
     vector,
 )
-from crosscheck.engines.loaders.placing import ORIGIN, Place, turned
+from crosscheck.engines.loaders.posed import Pose, Posed
 
 TURN, SHIFT, SEED = 0.7, 0.2, 7  # largest displacements: rad, and parts of the machine's size
 POSES = 3
-Pose = dict[str, float]
 
 
 def poses(machine: Machine, size: float) -> list[Pose]:
@@ -60,81 +57,36 @@ def in_order(couplings: Sequence[Coupling]) -> list[Coupling]:
 
 def statics_of(machine: Machine, pose: Mapping[str, float], gravity: Vector) -> Statics:
     """Return the statics of the tree at a pose; joints with several coordinates stay at the reference."""
-    chains, moved = _chains(machine), _moved(machine, pose)
-    single = [joint for joint in machine.joints if joint.type in SCALAR]
-    number = {joint.name: k for k, joint in enumerate(single)}
-    mass = np.diag([joint.armature or 0.0 for joint in single]).reshape(len(single), len(single))
-    torque, centres = np.zeros(len(single)), dict[str, Vector]()
-    columns = {j.name: _Column(j, moved[_name(j)]) for j in single}
+    at = Posed(machine, pose)
+    rotors = {joint.name: joint.armature or 0.0 for joint in machine.joints}
+    mass = np.diag([rotors[name] for name in at.joints]).reshape(len(at.joints), len(at.joints))
+    torque, centres = np.zeros(len(at.joints)), dict[str, Vector]()
+    for moving in moving_bodies(machine, at):
+        centres[moving.name] = vector(moving.centre)
+        shift, turn = moving.columns[:3], moving.columns[3:]
+        mass += moving.mass * shift.T @ shift + turn.T @ moving.inertia @ turn
+        torque -= moving.mass * shift.T @ np.array(gravity)
+    return Statics(at.joints, matrix(mass), vector(torque), centres)
+
+
+class Moving(NamedTuple):
+    """A body at a pose: mass, centre of mass (3,), inertia (3, 3) and the columns (6, n) of its centre."""
+
+    name: str
+    mass: float
+    centre: np.ndarray
+    inertia: np.ndarray
+    columns: np.ndarray
+
+
+def moving_bodies(machine: Machine, at: Posed) -> Iterator[Moving]:
+    """Yield the bodies with known masses, centres and inertias."""
     for body in machine.bodies:
-        if body.centre is None or body.inertia is None or body.mass is None:
-            continue
-        place = moved.get(body.name, ORIGIN)
-        centre = np.array(place.point(body.centre))
-        centres[body.name] = vector(centre)
-        shift, turn = np.zeros((2, 3, len(single)))
-        for joint in chains[body.name]:
-            if joint.name in number:
-                shift[:, number[joint.name]], turn[:, number[joint.name]] = columns[joint.name](centre)
-        inertia = place.turn @ np.array(body.inertia) @ place.turn.T
-        mass += body.mass * shift.T @ shift + turn.T @ inertia @ turn
-        torque -= body.mass * shift.T @ np.array(gravity)
-    return Statics(tuple(number), matrix(mass), vector(torque), centres)
-
-
-def _chains(machine: Machine) -> dict[str, list[Joint]]:
-    """Return the joints between the world and each body."""
-    onto: dict[str, list[Joint]] = {}
-    for joint in machine.joints:
-        onto.setdefault(joint.bodies[1], []).append(joint)
-    found: dict[str, list[Joint]] = {WORLD: []}
-    for body in machine.bodies:
-        chain, name = list[Joint](), body.name
-        while name in onto and len(chain) <= len(machine.joints):
-            chain += reversed(onto[name])
-            name = onto[name][0].bodies[0]
-        found[body.name] = chain[::-1]
-    return found
-
-
-def _name(joint: Joint) -> str:
-    return f"after joint {joint.name}"
-
-
-def _moved(machine: Machine, pose: Mapping[str, float]) -> dict[str, Place]:
-    """Return the displacement from the reference pose of each body, and of the frame of each joint."""
-    found: dict[str, Place] = {}
-    for body, chain in _chains(machine).items():
-        place = ORIGIN
-        for joint in chain:
-            found[_name(joint)] = place
-            if joint.type in SCALAR and joint.axis is not None and joint.anchor is not None:
-                place = place.then(_motion(joint, pose.get(joint.name, 0.0)))
-        found[body] = place
-    return found
-
-
-def _motion(joint: Joint, value: float) -> Place:
-    assert joint.axis is not None and joint.anchor is not None
-    if joint.type == REVOLUTE:
-        return turned(joint.anchor, joint.axis, value)
-    return Place(np.array(joint.axis) * value, np.eye(3))
-
-
-class _Column:
-    """The velocity of a point and the angular velocity per unit rate of a joint, at its displaced frame."""
-
-    def __init__(self, joint: Joint, place: Place):
-        assert joint.axis is not None and joint.anchor is not None and joint.type != FIXED
-        self.turns = joint.type == REVOLUTE
-        self.axis, self.anchor = (
-            np.array(f) for f in (place.direction(joint.axis), place.point(joint.anchor))
-        )
-
-    def __call__(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        if self.turns:
-            return np.cross(self.axis, point - self.anchor), self.axis
-        return self.axis, np.zeros(3)
+        if body.centre is not None and body.inertia is not None and body.mass is not None:
+            place = at.places[body.name]
+            centre = np.array(place.point(body.centre))
+            inertia = place.turn @ np.array(body.inertia) @ place.turn.T
+            yield Moving(body.name, body.mass, centre, inertia, at.columns(body.name, centre))
 
 
 def reduced(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ from crosscheck.engines.loaders.machine import (
     vector,
 )
 from crosscheck.engines.loaders.placing import Place
+from crosscheck.engines.loaders.posed import Pose
 
 TYPES = {
     "WeldJoint": FIXED,
@@ -159,23 +160,46 @@ class Skeletons(Loaded):
             if joint.getNumDofs() == 1 and joint.getActuatorType() == mimic:
                 yield Coupling(joint.getName(), joint.getName(), "", ())  # Python has no access to the law
 
-    def accelerations(
-        self, pose: Mapping[str, float], rates: Mapping[str, float], gravity: Vector
-    ) -> dict[str, float]:
-        single = [joint for joint in self.joints if joint.getNumDofs() == 1]
-        for joint in single:
-            joint.setPosition(0, pose.get(joint.getName(), 0.0))
-            joint.setVelocity(0, rates.get(joint.getName(), 0.0))
+    def accelerations(self, pose: Pose, rates: Pose, gravity: Vector) -> dict[str, float]:
+        if any(True for _ in (*self._loops(), *self._couplings())):
+            raise NotImplementedError("DART has constraints in steps alone")
+        self._put(pose, rates)
         for skeleton in self.skeletons:
             skeleton.setGravity(np.array(gravity))
             skeleton.setTimeStep(INSTANT)
             skeleton.computeForwardDynamics()
-        return {joint.getName(): float(joint.getAcceleration(0)) for joint in single}
+        return {joint.getName(): float(joint.getAcceleration(0)) for joint in self._single()}
 
-    def statics(self, pose: Mapping[str, float], gravity: Vector) -> Statics:
-        for joint in self.joints:
-            if joint.getNumDofs() == 1:
-                joint.setPosition(0, pose.get(joint.getName(), 0.0))
+    def motion(
+        self, pose: Pose, rates: Pose, gravity: Vector, duration: float, step: float
+    ) -> dict[str, float]:
+        """Simulate the file's world, or a world for the skeleton of a URDF."""
+        world = self.world or self.dart.simulation.World()
+        if self.world is None and not world.getNumSkeletons():
+            for skeleton in self.skeletons:
+                world.addSkeleton(skeleton)
+        self._put(pose, rates)
+        for joint in self._single():
+            joint.setLimitEnforcement(False)
+            joint.setCoulombFriction(0, 0.0)
+        for node in self.nodes:
+            node.setCollidable(False)
+        world.setGravity(np.array(gravity))
+        world.setTimeStep(step)
+        for _ in range(round(duration / step)):
+            world.step()
+        return {joint.getName(): float(joint.getPosition(0)) for joint in self._single()}
+
+    def _single(self) -> list[Any]:
+        return [joint for joint in self.joints if joint.getNumDofs() == 1]
+
+    def _put(self, pose: Pose, rates: Pose) -> None:
+        for joint in self._single():
+            joint.setPosition(0, pose.get(joint.getName(), 0.0))
+            joint.setVelocity(0, rates.get(joint.getName(), 0.0))
+
+    def statics(self, pose: Pose, gravity: Vector) -> Statics:
+        self._put(pose, {})
         names, places, size = list[str](), list[int](), sum(s.getNumDofs() for s in self.skeletons)
         mass, torque, start = np.zeros((size, size)), np.zeros(size), 0
         for skeleton in self.skeletons:

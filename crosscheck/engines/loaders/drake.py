@@ -30,6 +30,7 @@ from crosscheck.engines.loaders.machine import (
     vector,
 )
 from crosscheck.engines.loaders.placing import Place
+from crosscheck.engines.loaders.posed import Pose
 
 TYPES = {
     "weld": FIXED,
@@ -61,7 +62,14 @@ class Drake(Loader):
 class Plant(Loaded):
     """A plant at its default positions; a ``step`` (s) of 0 makes it continuous."""
 
-    def __init__(self, path: Path, form: str, gravity: Vector | None = None, step: float = STEP):
+    def __init__(
+        self,
+        path: Path,
+        form: str,
+        gravity: Vector | None = None,
+        step: float = STEP,
+        limited: bool = True,
+    ):
         from pydrake.multibody.parsing import Parser
         from pydrake.multibody.plant import MultibodyPlant
 
@@ -73,6 +81,10 @@ class Plant(Loaded):
             plant.WeldFrames(plant.world_frame(), plant.GetBodyByName(root, models[0]).body_frame())
         if gravity is not None:
             plant.mutable_gravity_field().set_gravity_vector(gravity)
+        for joint in [] if limited else [plant.get_joint(i) for i in plant.GetJointIndices()]:
+            endless = np.full(joint.num_positions(), np.inf)
+            if TYPES.get(joint.type_name()) in SCALAR:
+                joint.set_position_limits(-endless, endless)
         plant.Finalize()
         self.context = plant.CreateDefaultContext()
         self.bodies = bodies
@@ -158,30 +170,45 @@ class Plant(Loaded):
             q[place] = value
         self.plant.SetPositions(context, q)
 
-    def accelerations(
-        self, pose: Mapping[str, float], rates: Mapping[str, float], gravity: Vector
-    ) -> dict[str, float]:
+    def accelerations(self, pose: Pose, rates: Pose, gravity: Vector) -> dict[str, float]:
+        if self.plant.num_constraints():
+            raise NotImplementedError("Drake has constraints in discrete steps alone")
         found = Plant(self.path, self.form, gravity, step=0.0)
-        plant, context = found.plant, found.plant.CreateDefaultContext()
-        single = {j.name(): j for j in found.joints if TYPES.get(j.type_name()) in SCALAR}
-        start = {name: float(joint.default_positions()[0]) for name, joint in single.items()}
-        found._put(
-            context, {j.position_start(): start[name] + pose.get(name, 0.0) for name, j in single.items()}
-        )
-        v = np.zeros(plant.num_velocities())
-        for name, joint in single.items():
-            v[joint.velocity_start()] = rates.get(name, 0.0)
-        plant.SetVelocities(context, v)
+        plant, context = found.plant, found.moving(pose, rates)
         change = plant.EvalTimeDerivatives(context).CopyToVector()[plant.num_positions() :]
-        return {name: float(change[joint.velocity_start()]) for name, joint in single.items()}
+        return {joint.name(): float(change[joint.velocity_start()]) for joint in found.single()}
 
-    def statics(self, pose: Mapping[str, float], gravity: Vector) -> Statics:
+    def motion(
+        self, pose: Pose, rates: Pose, gravity: Vector, duration: float, step: float
+    ) -> dict[str, float]:
+        """Simulate the discrete plant without limits of joints."""
+        from pydrake.systems.analysis import Simulator
+
+        found = Plant(self.path, self.form, gravity, step, limited=False)
+        simulator = Simulator(found.plant, found.moving(pose, rates))
+        simulator.AdvanceTo(duration)
+        q = found.plant.GetPositions(simulator.get_context())
+        return {j.name(): float(q[j.position_start()] - j.default_positions()[0]) for j in found.single()}
+
+    def single(self) -> list[Any]:
+        """Return the hinges and slides."""
+        return [joint for joint in self.joints if TYPES.get(joint.type_name()) in SCALAR]
+
+    def moving(self, pose: Pose, rates: Pose) -> Any:
+        """Return a context at a pose and rates."""
+        context, v = self.plant.CreateDefaultContext(), np.zeros(self.plant.num_velocities())
+        starts = {joint: float(joint.default_positions()[0]) for joint in self.single()}
+        self._put(context, {j.position_start(): q + pose.get(j.name(), 0.0) for j, q in starts.items()})
+        for joint in self.single():
+            v[joint.velocity_start()] = rates.get(joint.name(), 0.0)
+        self.plant.SetVelocities(context, v)
+        return context
+
+    def statics(self, pose: Pose, gravity: Vector) -> Statics:
         if vector(self.plant.gravity_field().gravity_vector()) != tuple(gravity):
             self.__init__(self.path, self.form, gravity)  # type: ignore[misc]
-        plant, context = self.plant, self.plant.CreateDefaultContext()
-        single = [j for j in self.joints if TYPES.get(j.type_name()) in SCALAR]
-        at = {j: float(j.default_positions()[0]) + pose.get(j.name(), 0.0) for j in single}
-        self._put(context, {joint.position_start(): value for joint, value in at.items()})
+        plant, context = self.plant, self.moving(pose, {})
+        single = self.single()
         dofs = [joint.velocity_start() for joint in single]
         mass, torque = plant.CalcMassMatrix(context), -plant.CalcGravityGeneralizedForces(context)
         self.context = context

@@ -26,6 +26,7 @@ from crosscheck.engines.loaders.machine import (
     vector,
 )
 from crosscheck.engines.loaders.placing import of_matrix
+from crosscheck.engines.loaders.posed import Pose
 
 TYPES = {
     "revolute": REVOLUTE,
@@ -147,7 +148,7 @@ class Kinematic(Loaded):
         skew = (turn - turn.T) / 2
         return vector(np.array([skew[2, 1], skew[0, 2], skew[1, 0]]) / math.sin(NUDGE))
 
-    def statics(self, pose: Mapping[str, float], gravity: Vector) -> Statics:
+    def statics(self, pose: Pose, gravity: Vector) -> Statics:
         places = self.places(pose)
         names = [n for n, kind in self.kinds.items() if TYPES[kind] in SCALAR and n not in self.followers]
         centres = {}

@@ -3,35 +3,48 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
-from crosscheck.engines.loaders.machine import Machine, Statics, Vector
+from crosscheck.engines.loaders.machine import Machine, Rows, Statics, Vector
+from crosscheck.engines.loaders.posed import Pose
 
 MJCF, URDF, SDF = "MJCF", "URDF", "SDF"
 DOUBLE, SINGLE = 1e-6, 1e-4  # largest relative difference of numbers that agree, by the engine's precision
+DURATION, STEP = 0.1, 1e-3  # s, of a compared motion and of its longer steps
 
 
 class Loaded(ABC):
-    """A file in an engine."""
+    """A file in an engine. Poses are displacements (rad or m) of hinges and slides from the reference pose; a
+    joint without entry stays there. A function that the engine lacks raises NotImplementedError, whose words
+    say why."""
 
     @abstractmethod
     def machine(self) -> Machine:
         """Return the machine that the engine built."""
 
     @abstractmethod
-    def statics(self, pose: Mapping[str, float], gravity: Vector) -> Statics:
-        """Return the engine's own mass matrix and gravity torques at displacements (rad or m) of joints from
-        the reference pose; a joint without entry stays there."""
+    def statics(self, pose: Pose, gravity: Vector) -> Statics:
+        """Return the engine's own mass matrix and gravity torques at a pose."""
 
-    def accelerations(
-        self, pose: Mapping[str, float], rates: Mapping[str, float], gravity: Vector
-    ) -> dict[str, float]:
-        """Return the engine's own accelerations of hinges and slides at a pose and rates, without motors,
-        limits and dry friction. A reader without dynamics raises NotImplementedError."""
+    def rows(self, pose: Pose) -> Rows:
+        """Return the engine's own Jacobian of loops and couplings at a pose that obeys them."""
         raise NotImplementedError
+
+    def accelerations(self, pose: Pose, rates: Pose, gravity: Vector) -> dict[str, float]:
+        """Return the engine's own accelerations of hinges and slides at a pose and rates, without motors,
+        limits and dry friction."""
+        raise NotImplementedError
+
+    def motion(
+        self, pose: Pose, rates: Pose, gravity: Vector, duration: float, step: float
+    ) -> dict[str, float]:
+        """Return the displacements of hinges and slides after the engine's simulation in steps (s), without
+        motors, limits, dry friction and contacts."""
+        raise NotImplementedError("the reader has no simulation of its own")
 
 
 class Loader(ABC):
@@ -58,34 +71,59 @@ class Loader(ABC):
 
 
 @dataclass(frozen=True)
+class Asked:
+    """Poses for statics, poses that obey loops and couplings, states (pose and rates) for accelerations, the
+    states from which to move for ``DURATION``, and gravity (3,)."""
+
+    poses: Sequence[Pose]
+    closed: Sequence[Pose]
+    states: Sequence[tuple[Pose, Pose]]
+    starts: Sequence[tuple[Pose, Pose]]
+    gravity: Vector
+
+
+@dataclass(frozen=True)
 class Built:
-    """Version of the package, the machine, statics and accelerations at each pose; ``fault`` is why they are
-    missing."""
+    """Version of the package, the machine, and the engine's answers to each question.
+
+    ``ends`` are displacements after a motion from each start, extrapolated from two sizes of steps to step
+    zero. ``faults`` is why a quantity is missing, by its name.
+    """
 
     version: str
     machine: Machine
-    statics: tuple[Statics, ...]
-    accelerations: tuple[dict[str, float], ...] = ()
-    fault: str = ""
+    statics: Sequence[Statics] = ()
+    rows: Sequence[Rows] = ()
+    accelerations: Sequence[Mapping[str, float]] = ()
+    ends: Sequence[Mapping[str, float]] = ()
+    faults: Mapping[str, str] = field(default_factory=dict)
 
 
-def built(
-    loader: Loader,
-    path: Path,
-    form: str,
-    poses: Sequence[Mapping[str, float]],
-    rates: Sequence[Mapping[str, float]],
-    gravity: Vector,
-) -> Built:
+def built(loader: Loader, path: Path, form: str, asked: Asked) -> Built:
     """Return the engine's reading of a file; raises whatever the engine raises while it reads."""
-    loaded = loader.load(path, form)
-    machine, fault = loaded.machine(), ""
-    found, moved = list[Statics](), list[dict[str, float]]()
-    try:
-        found = [loaded.statics(pose, gravity) for pose in poses]
-        moved = [loaded.accelerations(p, v, gravity) for p, v in zip(poses, rates, strict=False)]
-    except NotImplementedError as reason:
-        fault = str(reason)
-    except Exception as error:  # an engine may raise anything about its own model
-        fault = f"{type(error).__name__}: {error}"
-    return Built(loader.installed(), machine, tuple(found), tuple(moved), fault)
+    loaded, faults = loader.load(path, form), dict[str, str]()
+    machine, gravity = loaded.machine(), asked.gravity
+
+    def answers(name: str, ask: Callable[..., Any], questions: Iterable[Sequence[Any]]) -> list[Any]:
+        try:
+            return [ask(*question) for question in questions]
+        except NotImplementedError as reason:
+            fault = str(reason)
+        except Exception as error:  # an engine may raise anything about its own model
+            fault = f"{type(error).__name__}: {error}"
+        faults.update({name: fault} if fault else {})
+        return []
+
+    def end(pose: Pose, rates: Pose) -> dict[str, float]:
+        coarse, fine = (loaded.motion(pose, rates, gravity, DURATION, step) for step in (STEP, STEP / 2))
+        return {name: 2 * fine[name] - coarse[name] for name in fine}  # errors are of order one
+
+    return Built(
+        loader.installed(),
+        machine,
+        answers("mass matrix", loaded.statics, ((pose, gravity) for pose in asked.poses)),
+        answers("rows of loops and couplings", loaded.rows, ((pose,) for pose in asked.closed)),
+        answers("accelerations", loaded.accelerations, ((*state, gravity) for state in asked.states)),
+        answers("motion", end, asked.starts),
+        faults,
+    )

@@ -7,9 +7,11 @@ Units are SI and rad. None stands for a quantity that the format does not state 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
+
+import numpy as np
 
 WORLD = "world"
 FIXED, REVOLUTE, TRANSLATIONAL = "fixed", "revolute", "translational"
@@ -57,12 +59,13 @@ class Joint:
 
 @dataclass(frozen=True)
 class Loop:
-    """A constraint between two bodies of the tree; its anchor on each of them is at the reference pose."""
+    """A constraint between two bodies of the tree; anchors and axis are at the reference pose."""
 
     name: str
     type: str
     bodies: tuple[str, str]
     anchors: tuple[Vector, Vector] | None = None
+    axis: Vector | None = None
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,22 @@ class Statics:
     mass: Matrix | None
     gravity: Vector | None
     centres: dict[str, Vector]
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Constraint Jacobian (m, n) of loops and couplings: each row times the rates of ``joints`` is zero."""
+
+    joints: tuple[str, ...]
+    matrix: Matrix
+
+    def of(self, names: Sequence[str]) -> np.ndarray:
+        """Return the columns (m, k) of joints; a joint without column has zeros."""
+        found = np.zeros((len(self.matrix), len(names)))
+        for k, name in enumerate(names):
+            if name in self.joints:
+                found[:, k] = [row[self.joints.index(name)] for row in self.matrix]
+        return found
 
 
 def vector(values: Iterable[Any]) -> Vector:

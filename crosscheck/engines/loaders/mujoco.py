@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.loaders.constrained import held
 from crosscheck.engines.loaders.loader import MJCF, URDF, Loaded, Loader
 from crosscheck.engines.loaders.machine import (
     FIXED,
@@ -21,6 +22,7 @@ from crosscheck.engines.loaders.machine import (
     Joint,
     Loop,
     Machine,
+    Rows,
     Statics,
     Vector,
     coefficients,
@@ -28,6 +30,7 @@ from crosscheck.engines.loaders.machine import (
     matrix,
     vector,
 )
+from crosscheck.engines.loaders.posed import Pose
 from crosscheck.engines.mujoco.importing.couplings import of_equalities
 from crosscheck.engines.mujoco.importing.posing import JointRow
 
@@ -54,7 +57,7 @@ class Compiled(Loaded):
 
     def __init__(self, mujoco: Any, model: Any):
         self.mujoco, self.model = mujoco, model
-        self.data = mujoco.MjData(model)
+        self.data, self.flags = mujoco.MjData(model), int(model.opt.disableflags)
         self.place()
 
     def place(self) -> None:
@@ -164,14 +167,14 @@ class Compiled(Loaded):
         single = [j for j in range(m.njnt) if TYPES[int(m.jnt_type[j])] in (REVOLUTE, TRANSLATIONAL)]
         return {self.joint(j): int(m.jnt_dofadr[j]) for j in single}
 
-    def coordinates(self, pose: Mapping[str, float]) -> np.ndarray:
+    def coordinates(self, pose: Pose) -> np.ndarray:
         """Return the coordinates at displacements of hinges and slides from the reference pose."""
         m, q = self.model, np.array(self.model.qpos0)
         for name, dof in self.dofs().items():
             q[m.jnt_qposadr[m.dof_jntid[dof]]] += pose.get(name, 0.0)
         return q
 
-    def statics(self, pose: Mapping[str, float], gravity: Vector) -> Statics:
+    def statics(self, pose: Pose, gravity: Vector) -> Statics:
         m, data, dofs = self.model, self.data, self.dofs()
         m.opt.gravity[:], m.opt.disableflags = gravity, 0
         data.qpos[:], data.qvel[:] = self.coordinates(pose), 0.0
@@ -184,17 +187,54 @@ class Compiled(Loaded):
         mass = self._mass()[np.ix_(places, places)]
         return Statics(tuple(dofs), matrix(mass), vector(torque[places]), centres)
 
-    def accelerations(
-        self, pose: Mapping[str, float], rates: Mapping[str, float], gravity: Vector
-    ) -> dict[str, float]:
+    def rows(self, pose: Pose) -> Rows:
+        """Return MuJoCo's Jacobian of the equalities that are on."""
+        m, data, dofs = self.model, self.data, self.dofs()
+        m.opt.disableflags = self.equalities_alone()
+        m.opt.jacobian = self.mujoco.mjtJacobian.mjJAC_DENSE
+        data.qpos[:], data.qvel[:] = self.coordinates(pose), 0.0
+        self.mujoco.mj_fwdPosition(m, data)
+        every = np.array(data.efc_J).reshape(-1, m.nv)[: data.ne]
+        return Rows(tuple(dofs), matrix(every[:, list(dofs.values())]))
+
+    def equalities_alone(self) -> int:
+        """Return the flags that disable all forces of constraints except the file's equalities."""
+        bits = self.mujoco.mjtDisableBit
+        others = bits.mjDSBL_CONTACT | bits.mjDSBL_LIMIT | bits.mjDSBL_FRICTIONLOSS | bits.mjDSBL_ACTUATION
+        return int(others) | self.flags & int(bits.mjDSBL_EQUALITY | bits.mjDSBL_CONSTRAINT)
+
+    def accelerations(self, pose: Pose, rates: Pose, gravity: Vector) -> dict[str, float]:
+        """Return accelerations from MuJoCo's mass matrix, forces and rows; the rows hold exactly, which
+        MuJoCo's soft equalities do not."""
         m, data, bits, dofs = self.model, self.data, self.mujoco.mjtDisableBit, self.dofs()
         m.opt.gravity[:] = gravity
         m.opt.disableflags = int(bits.mjDSBL_CONSTRAINT | bits.mjDSBL_ACTUATION)
-        data.qpos[:], data.qvel[:] = self.coordinates(pose), 0.0
-        for name, dof in dofs.items():
-            data.qvel[dof] = rates.get(name, 0.0)
+        self._put(pose, rates)
         self.mujoco.mj_forward(m, data)
-        return {name: float(data.qacc[dof]) for name, dof in dofs.items()}
+        places = list(dofs.values())
+        mass, force = self._mass()[np.ix_(places, places)], (data.qfrc_passive - data.qfrc_bias)[places]
+        if not m.neq:
+            return {name: float(data.qacc[dof]) for name, dof in dofs.items()}
+        return held(tuple(dofs), mass, force, self.rows, pose, rates)
+
+    def motion(
+        self, pose: Pose, rates: Pose, gravity: Vector, duration: float, step: float
+    ) -> dict[str, float]:
+        """Simulate by the file's integrator; equalities are as stiff as the step allows."""
+        m, data, dofs = self.model, self.data, self.dofs()
+        m.opt.gravity[:], m.opt.timestep = gravity, step
+        m.opt.disableflags = self.equalities_alone()
+        m.eq_solref[:] = (2 * step, 1.0)
+        self._put(pose, rates)
+        self.mujoco.mj_step(m, data, round(duration / step))
+        start = {name: m.jnt_qposadr[m.dof_jntid[dof]] for name, dof in dofs.items()}
+        return {name: float(data.qpos[q] - m.qpos0[q]) for name, q in start.items()}
+
+    def _put(self, pose: Pose, rates: Pose) -> None:
+        self.mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:], self.data.qvel[:] = self.coordinates(pose), 0.0
+        for name, dof in self.dofs().items():
+            self.data.qvel[dof] = rates.get(name, 0.0)
 
     def _mass(self) -> np.ndarray:
         """Return the mass matrix (nv, nv)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ from crosscheck.engines.loaders.machine import (
     vector,
 )
 from crosscheck.engines.loaders.placing import ORIGIN, Place, of_xyzw
+from crosscheck.engines.loaders.posed import Pose
 
 TYPES = {
     "FIXED": FIXED,
@@ -171,7 +172,40 @@ class Builder(Loaded):
                 law = b.constraint_mimic_coef0[k], b.constraint_mimic_coef1[k]
                 yield Coupling(names[0], *names, coefficients(*law))
 
-    def statics(self, pose: Mapping[str, float], gravity: Vector) -> Statics:
+    def motion(
+        self, pose: Pose, rates: Pose, gravity: Vector, duration: float, step: float
+    ) -> dict[str, float]:
+        """Simulate by SolverFeatherstone, which holds mimics of a URDF and no equalities of an MJCF file."""
+        if len(self.frames) < self.b.joint_count or any(self.b.constraint_mimic_enabled):
+            raise NotImplementedError("SolverFeatherstone does not hold loops and equalities of MJCF")
+        newton = self.newton
+        model = self.b.finalize(device="cpu")
+        model.set_gravity(tuple(gravity))
+        for ends in (model.joint_limit_ke, model.joint_limit_kd, model.joint_friction):
+            ends.zero_()
+        start = np.array(model.joint_q.numpy())  # NumPy's arrays share the memory of Warp's
+        q, qd = np.array(start), np.array(model.joint_qd.numpy())
+        places = {}
+        for j in self.frames:
+            if self._type(j) in SCALAR:
+                name = str(self.b.joint_label[j]).rsplit("/", maxsplit=1)[-1]
+                places[name] = int(self.b.joint_q_start[j])
+                q[places[name]] += pose.get(name, 0.0)
+                qd[int(self.b.joint_qd_start[j])] = rates.get(name, 0.0)
+        now, after = model.state(), model.state()
+        now.joint_q.assign(q)
+        now.joint_qd.assign(qd)
+        newton.eval_fk(model, now.joint_q, now.joint_qd, now)
+        solver = newton.solvers.SolverFeatherstone(model, angular_damping=0.0)
+        control = model.control()
+        for _ in range(round(duration / step)):
+            now.clear_forces()
+            solver.step(now, after, control, None, step)
+            now, after = after, now
+        end = now.joint_q.numpy()
+        return {name: float(end[k] - start[k]) for name, k in places.items()}
+
+    def statics(self, pose: Pose, gravity: Vector) -> Statics:
         """Return Newton's mass matrix in single precision; it gives gravity torques to its solvers alone."""
         model = self.b.finalize(device="cpu")
         q, names, dofs = model.joint_q.numpy(), list[str](), list[int]()

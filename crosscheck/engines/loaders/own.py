@@ -10,9 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.loaders.constrained import along
 from crosscheck.engines.loaders.loader import MJCF, SDF, URDF, Loaded, Loader
 from crosscheck.engines.loaders.machine import (
     FIXED,
+    REVOLUTE,
+    SCALAR,
+    TRANSLATIONAL,
     WORLD,
     Body,
     Coupling,
@@ -25,9 +29,12 @@ from crosscheck.engines.loaders.machine import (
     limits,
     vector,
 )
-from crosscheck.engines.loaders.placing import Place
+from crosscheck.engines.loaders.placing import ORIGIN, Place, vector_of
+from crosscheck.engines.loaders.posed import Pose, Posed
 from crosscheck.engines.mujoco.importing.actuators import Actuators
+from crosscheck.judge.small_motions.posed import posed as restarted
 from mbref import formats, rotations
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import GROUND, Scene, SlideSpring, TorsionSpring
 from mbref.scene import Joint as AnyJoint
 
@@ -80,10 +87,7 @@ class Imported(Loaded):
         body = self.scene.body[k]
         inertia = np.asarray(body.inertia if body.inertia is not None else np.zeros(3), float)
         moments = np.diag(inertia) if inertia.ndim == 1 else inertia
-        turn = rotations.to_matrix(np.array(body.orientation, float))
-        return Place(np.array(body.position, float), turn).body(
-            body.name, body.mass or 0.0, [0, 0, 0], moments
-        )
+        return self._place(k).body(body.name, body.mass or 0.0, [0, 0, 0], moments)
 
     def _tree(self) -> tuple[list[Joint], list[Loop]]:
         """Return the joints that connect new bodies, in the scene's order, and the others as loops."""
@@ -100,17 +104,18 @@ class Imported(Loaded):
             pair = WORLD if first == GROUND else first, WORLD if second == GROUND else second
             anchors = joint.anchor_pair
             if end(first) == end(second):
-                loops.append(Loop(joint.name, joint.type, pair, (vector(anchors[0]), vector(anchors[1]))))
+                ends = vector(anchors[0]), vector(anchors[1])
+                loops.append(Loop(joint.name, joint.type, pair, ends, _axis(joint)))
                 continue
             root[end(second)] = end(first)
-            axes = [rotations.unit(np.array(axis, float)) for axis in joint.directions]
+
             tree.append(
                 Joint(
                     joint.name,
                     "screw" if joint.name in pitches else joint.type,
                     pair,
                     vector(anchors[0]),
-                    vector(axes[0]) if len(axes) == 1 else None,
+                    _axis(joint),
                     pitch=pitches.get(joint.name),
                     **(self._numbers(joint) if joint.type != FIXED else {}),
                 )
@@ -150,8 +155,77 @@ class Imported(Loaded):
         for driver in self.scene.driver:
             yield Coupling(driver.joint, driver.joint, "", ())  # a joint that the file locks
 
-    def statics(self, pose: Mapping[str, float], gravity: Vector) -> Statics:
+    def statics(self, pose: Pose, gravity: Vector) -> Statics:
         raise NotImplementedError  # a scene has no joint coordinates
+
+    def accelerations(self, pose: Pose, rates: Pose, gravity: Vector) -> dict[str, float]:
+        """Return accelerations of joints from mbref's accelerations of bodies at the start of a run."""
+        at, machine = self._run(pose, rates, gravity, np.zeros(1)), self.machine()
+        posed = Posed(machine, pose)
+        if at.acceleration is None or at.angular_acceleration is None or not len(at.times):
+            raise ValueError(at.message)
+        v = np.array([rates.get(name, 0.0) for name in posed.joints])
+        drift = along(lambda q: self._columns(Posed(machine, q)) @ v, pose, rates)
+        theirs = np.hstack([at.acceleration[0], at.angular_acceleration[0]]).ravel()
+        found = np.linalg.lstsq(self._columns(posed), theirs - drift, rcond=None)[0]
+        return dict(zip(posed.joints, found.tolist(), strict=True))
+
+    def motion(
+        self, pose: Pose, rates: Pose, gravity: Vector, duration: float, step: float
+    ) -> dict[str, float]:
+        """Simulate by the default method; the step is mbref's own."""
+        run = self._run(pose, rates, gravity, np.array([0.0, duration]))
+        if run.outcome is not Outcome.COMPLETED:
+            raise ValueError(run.message)
+        ends = {body.name: k for k, body in enumerate(self.scene.body)}
+        turns = {name: rotations.to_matrix(run.orientation[-1, k]) for name, k in ends.items()}
+        now = {n: Place(run.position[-1, k], turns[n]) for n, k in ends.items()} | {WORLD: ORIGIN}
+        start = {n: self._place(k) for n, k in ends.items()} | {WORLD: ORIGIN}
+        moved = {name: now[name].then(start[name].inverse()) for name in now}
+        return {j.name: _displacement(j, moved) for j in self.machine().joints if j.type in SCALAR}
+
+    def _columns(self, posed: Posed) -> np.ndarray:
+        """Return the columns (6 nb, n) of the bodies' centres of mass."""
+        places = [(body.name, posed.places[body.name].point(body.position)) for body in self.scene.body]
+        return np.vstack([posed.columns(name, np.array(point)) for name, point in places])
+
+    def _run(self, pose: Pose, rates: Pose, gravity: Vector, times: np.ndarray) -> Trajectory:
+        """Return the run of the scene from a pose and rates."""
+        if any(MOVED in message for message in self.messages):
+            raise NotImplementedError("the import moved the joints to close the loops")
+        posed, scene = Posed(self.machine(), pose), self.scene
+        v = np.array([rates.get(name, 0.0) for name in posed.joints])
+        places = [posed.places[body.name].then(self._place(k)) for k, body in enumerate(scene.body)]
+        kinds = {REVOLUTE: "angle", TRANSLATIONAL: "displacement"}
+        values = {(kinds[j.type], j.name): pose.get(j.name, 0.0) for j in scene.joint if j.type in kinds}
+        positions = np.array([place.position for place in places])
+        turns = np.array([rotations.from_matrix(place.turn) for place in places])
+        twists = (self._columns(posed) @ v).reshape(-1, 6)
+        begun = restarted(scene.with_(gravity=tuple(gravity)), positions, turns, twists, values)
+        from crosscheck.engines.mbref import ENGINE
+
+        return ENGINE.run(begun, times, ENGINE.best_settings(begun)[-1])
+
+    def _place(self, k: int) -> Place:
+        """Return the place of a body at the reference pose."""
+        body = self.scene.body[k]
+        turn = rotations.to_matrix(np.array(body.orientation, float))
+        return Place(np.array(body.position, float), turn)
+
+
+def _axis(joint: AnyJoint) -> Vector | None:
+    """Return the direction of a joint with one axis."""
+    axes = joint.directions
+    return vector(rotations.unit(np.array(axes[0], float))) if len(axes) == 1 else None
+
+
+def _displacement(joint: Joint, moved: Mapping[str, Place]) -> float:
+    """Return the coordinate of a hinge (less than half a turn) or slide from displacements of bodies."""
+    assert joint.axis is not None
+    first, second = (moved[body] for body in joint.bodies)
+    relative = first.inverse().then(second)
+    moving = vector_of(relative.turn) if joint.type == REVOLUTE else relative.position
+    return float(moving @ np.array(joint.axis))
 
 
 def _servos(path: Path) -> dict[str, tuple[float, float]]:

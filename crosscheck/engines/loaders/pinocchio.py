@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.loaders.constrained import held
 from crosscheck.engines.loaders.loader import MJCF, URDF, Loaded, Loader
 from crosscheck.engines.loaders.machine import (
     FIXED,
@@ -21,6 +22,7 @@ from crosscheck.engines.loaders.machine import (
     Joint,
     Loop,
     Machine,
+    Rows,
     Statics,
     Vector,
     coefficients,
@@ -29,6 +31,7 @@ from crosscheck.engines.loaders.machine import (
     vector,
 )
 from crosscheck.engines.loaders.placing import Place
+from crosscheck.engines.loaders.posed import Pose
 
 COMPOSITE = "composite"  # several joints of one body
 TYPES = {  # beginnings of names of joint models, the first one that fits
@@ -191,7 +194,7 @@ class Built(Loaded):
             name, law = str(m.names[follower]), m.joints[follower].extract()
             yield Coupling(name, name, str(m.names[leader]), coefficients(law.offset, law.scaling))
 
-    def statics(self, pose: Mapping[str, float], gravity: Vector) -> Statics:
+    def statics(self, pose: Pose, gravity: Vector) -> Statics:
         self.model = m = self.coupled
         self.data, single = m.createData(), self._single()
         q = self._at(pose, single)
@@ -203,16 +206,56 @@ class Built(Loaded):
         dofs = list(single.values())
         return Statics(tuple(single), matrix(mass[np.ix_(dofs, dofs)]), vector(torque[dofs]), centres)
 
-    def accelerations(
-        self, pose: Mapping[str, float], rates: Mapping[str, float], gravity: Vector
-    ) -> dict[str, float]:
-        m, single = self.model, self._single()
+    def rows(self, pose: Pose) -> Rows:
+        """Return Pinocchio's Jacobian of its constraints; followers of a mimic have no coordinates."""
+        self.model = m = self.coupled
+        self.data, single = m.createData(), self._single()
+        self.place(self._at(pose, single))
+        found = []
+        for constraint in self.constraints:
+            data = constraint.createData()
+            constraint.calc(m, self.data, data)
+            found.append(np.array(self.pin.getConstraintJacobian(m, self.data, constraint, data)))
+        every = np.vstack([np.zeros((0, m.nv)), *found])
+        return Rows(tuple(single), matrix(every[:, list(single.values())]))
+
+    def accelerations(self, pose: Pose, rates: Pose, gravity: Vector) -> dict[str, float]:
+        """Return accelerations by ``aba``; with mimics or constraints from mass matrix, forces and
+        rows, which hold exactly."""
+        self.model = m = self.coupled
+        single = self._single()
         m.gravity.linear = np.array(gravity)
         v = np.zeros(m.nv)
         for name, k in single.items():
             v[k] = rates.get(name, 0.0)
-        found = self.pin.aba(m, m.createData(), self._at(pose, single), v, np.zeros(m.nv))
-        return {name: float(found[k]) for name, k in single.items()}
+        q = self._at(pose, single)
+        if not self.constraints and not len(m.mimicking_joints):
+            found = self.pin.aba(m, m.createData(), q, v, np.zeros(m.nv))
+            return {name: float(found[k]) for name, k in single.items()}
+        dofs = list(single.values())
+        force = -np.array(self.pin.rnea(m, m.createData(), q, v, np.zeros(m.nv)))[dofs]
+        upper = np.triu(self.pin.crba(m, m.createData(), q))
+        mass = (upper + np.triu(upper, 1).T)[np.ix_(dofs, dofs)]
+        return held(tuple(single), mass, force, self.rows, pose, rates)
+
+    def motion(
+        self, pose: Pose, rates: Pose, gravity: Vector, duration: float, step: float
+    ) -> dict[str, float]:
+        """Simulate by RK4 of crosscheck in steps ten times as long; Pinocchio has no integrator."""
+        names = tuple(self._single())
+
+        def change(y: np.ndarray) -> np.ndarray:
+            at, v = (dict(zip(names, half.tolist(), strict=True)) for half in np.split(y, 2))
+            found = self.accelerations({**pose, **at}, v, gravity)
+            return np.concatenate([y[len(names) :], [found[name] for name in names]])
+
+        y, h = np.array([part.get(name, 0.0) for part in (pose, rates) for name in names]), 10 * step
+        for _ in range(round(duration / h)):
+            first = change(y)
+            second = change(y + h / 2 * first)
+            third = change(y + h / 2 * second)
+            y = y + h / 6 * (first + 2 * second + 2 * third + change(y + h * third))
+        return dict(zip(names, y[: len(names)].tolist(), strict=True))
 
     def _single(self) -> dict[str, int]:
         """Return the index of the velocity of each coordinate of hinges and slides."""
@@ -224,7 +267,7 @@ class Built(Loaded):
                 single |= {own: m.joints[i].idx_v + k for k, own in enumerate(names) if m.joints[i].nv}
         return single
 
-    def _at(self, pose: Mapping[str, float], single: Mapping[str, int]) -> np.ndarray:
+    def _at(self, pose: Pose, single: Mapping[str, int]) -> np.ndarray:
         """Return the configuration at displacements from the reference."""
         moved = np.zeros(self.model.nv)
         for name, v in single.items():

@@ -60,6 +60,11 @@ def of_rpy(position: Any, angles: Any) -> Place:
     return Place(np.asarray(position, float), yaw @ pitch @ roll)
 
 
+def vector_of(turn: np.ndarray) -> np.ndarray:
+    """Return the rotation vector (3,) of a rotation matrix, rad."""
+    return np.asarray(rotations.to_vector(rotations.from_matrix(turn)[None])[0])
+
+
 def turned(anchor: Any, axis: Any, angle: float) -> Place:
     """Return the displacement of the world by a rotation of axis · angle about a point."""
     turn = rotations.to_matrix(rotations.from_vector(np.asarray(axis, float) * angle))

@@ -134,7 +134,7 @@ def _split(joints: list[Joint], links: list[ET.Element]) -> tuple[list[Joint], l
         first, second = map(end, joint.bodies)
         if first == second or joint.type == "gearbox":
             anchor = joint.anchor or ()
-            loops.append(Loop(joint.name, joint.type, joint.bodies, (anchor, anchor)))
+            loops.append(Loop(joint.name, joint.type, joint.bodies, (anchor, anchor), joint.axis))
             continue
         tree.append(joint)
         root[second if second != WORLD else first] = first if second != WORLD else second

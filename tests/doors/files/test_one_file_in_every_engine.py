@@ -11,20 +11,21 @@ import numpy as np
 import pytest
 
 from crosscheck.cli.commands import main
-from crosscheck.engines.loaders.loader import DOUBLE, MJCF, SDF, URDF
+from crosscheck.engines.loaders.loader import DOUBLE, MJCF, SDF, URDF, built
 from crosscheck.engines.loaders.machine import Machine, vector
 from crosscheck.engines.loaders.mujoco import Mujoco
 from crosscheck.engines.loaders.own import Own
+from crosscheck.files.constraints import rows_of
 from crosscheck.files.corpus import CASES
 from crosscheck.files.corpus.case import value_at
 from crosscheck.files.corpus.mjcf import HINGE, body, model
 from crosscheck.files.corpus.mjcf_equalities import pair
 from crosscheck.files.differences import of_reading
-from crosscheck.files.dynamics import of_dynamics
+from crosscheck.files.dynamics_differences import of_rows, of_values
 from crosscheck.files.matching import matched
 from crosscheck.files.meaning import form_of, meant
 from crosscheck.files.merged import size_of
-from crosscheck.files.reading import file_of
+from crosscheck.files.reading import differences, file_of, since
 from crosscheck.files.statics import poses
 from crosscheck.files.statics_differences import of_statics
 
@@ -35,6 +36,12 @@ LOOP = pair(
     '<connect name="close" body1="lower" body2="other" anchor="0.1 0 0.1"/>'
     '<joint name="gear" joint1="side" joint2="elbow" polycoef="0.1 2 0 0 0"/>'
 )
+
+
+def one_equality(kind: str) -> str:
+    """Return LOOP with its equality of a kind alone, which leaves one or two freedoms."""
+    others = "<connect [^>]*>" if kind == "joint" else "<joint [^>]*polycoef[^>]*>"
+    return re.sub(others, "", LOOP).replace('polycoef="0.1', 'polycoef="0')  # the reference pose obeys it
 
 
 def written(folder: Path, text: str, name: str = "robot.xml") -> Path:
@@ -145,18 +152,71 @@ def test_mass_matrix_and_gravity_torques_are_mujocos_at_four_poses(tmp_path: Pat
     assert [(d.field, d.name) for d in found] == [("mass matrix", "elbow")]
 
 
-def test_accelerations_are_mujocos_and_an_engine_without_dampers_is_named(tmp_path: Path):
-    """MuJoCo's own accelerations at four random states, with a spring and two dampers, and without these."""
+@pytest.mark.parametrize("what", ["tree", "connect", "joint"])
+def test_accelerations_and_motion_are_mujocos_and_an_engine_without_dampers_is_named(
+    what: str, tmp_path: Path
+):
+    """MuJoCo's own terms at random states, with a spring and two dampers, and without these, in a tree,
+    with a loop and with a coupling."""
     tree = '<joint name="elbow" type="hinge" axis="0 1 0" damping="0.3" stiffness="5" springref="20"/>'
     text = model(body("upper", HINGE.replace("/>", ' damping="0.2"/>') + body("lower", tree)))
     text = text.replace("<worldbody>", '<option gravity="1 2 -9"/><worldbody>')
+    if what != "tree":
+        text = one_equality(what).replace('name="elbow"', 'name="elbow" damping="0.3"')
     file = file_of(written(tmp_path, text))
+    assert len(file.asked.starts) == 1 and len(file.asked.closed) == (0 if what == "tree" else 4)
     match = matched(file.machine, file.machine, DOUBLE)
-    for text_of_engine, said in ((text, []), (re.sub(' damping="[^"]*"', "", text), ["elbow", "shoulder"])):
+    dampers = {joint.name for joint in file.machine.joints if joint.damping}
+    for text_of_engine, said in ((text, set()), (re.sub(' damping="[^"]*"', "", text), dampers)):
         engine = Mujoco().load(written(tmp_path, text_of_engine, "engine.xml"), MJCF)
-        own = [engine.accelerations(s.pose, s.rates, file.gravity) for s in file.states]
-        found = of_dynamics(match, own, file.states, 1e-9)  # of the largest: differences of order four
-        assert sorted(d.name for d in found) == said and {d.field for d in found} <= {"damping"}
+        rows = [engine.rows(pose) for pose in file.asked.closed]
+        assert of_rows(match, rows, file.asked.closed, ROUNDING * 1e3) == []  # poses are closed to 1e-11
+        own = [engine.accelerations(*state, file.asked.gravity) for state in file.asked.states]
+        found = of_values(match, own, file.accelerations, "acceleration", 1e-9)  # differences of order four
+        assert {d.name for d in found} == said and {d.field for d in found} <= {"damping"}
+
+
+@pytest.mark.parametrize("what", ["connect", "joint"])
+def test_motion_on_the_closure_is_mbrefs_and_mujocos(what: str, tmp_path: Path):
+    """Two independent runs of 0.1 s from a random state that obeys the equality: our import by mbref, and
+    MuJoCo in small steps."""
+    file = file_of(written(tmp_path, one_equality(what)))
+    for reader, tolerance in ((Own(), 1e-7), (Mujoco(), 1e-3)):  # MuJoCo's equalities are soft
+        found = built(reader, file.path, MJCF, file.asked)
+        assert found.ends and found.accelerations
+        assert differences(matched(file.machine, found.machine, DOUBLE), file, found, DOUBLE) == []
+        ends = [since(file.asked.starts[0][0], end) for end in found.ends]
+        assert (
+            of_values(
+                matched(file.machine, found.machine, DOUBLE), ends, file.moved, "displacement", tolerance
+            )
+            == []
+        )
+
+
+@pytest.mark.parametrize(
+    "change, named_so",
+    [
+        ({"body": "other"}, ("close", "Jacobian")),
+        ({"rows": 2}, ("close", "Jacobian")),
+        ({"more": True}, ("loops and couplings", "rank of the rows")),
+    ],
+)
+def test_rows_that_do_not_hold_the_loop_are_named(
+    change: dict[str, Any], named_so: tuple[str, str], tmp_path: Path
+):
+    file = file_of(written(tmp_path, one_equality("connect")))
+    match, size = matched(file.machine, file.machine, DOUBLE), size_of(file.machine)
+    loops = file.machine.loops or ()
+    if "body" in change:  # the anchor is on the other arm, where it is not fixed to the arm of the file
+        loops = tuple(replace(loop, bodies=("upper", loop.bodies[1])) for loop in loops)
+    rows = [rows_of(replace(file.machine, loops=loops), pose, size) for pose in file.asked.closed]
+    if "rows" in change:
+        rows = [replace(row, matrix=tuple(np.array(row.matrix)[[0]].tolist())) for row in rows]
+    if "more" in change:
+        rows = [replace(row, matrix=(*row.matrix, (1.0, 0.0, 0.0))) for row in rows]
+    found = of_rows(match, rows, file.asked.closed, DOUBLE)
+    assert named_so in [(d.name, d.field) for d in found]
 
 
 def test_verdict_names_what_is_dropped_and_whether_the_reader_says_so(tmp_path: Path, capsys: Any):
