@@ -85,7 +85,7 @@ def add_options(parser: Any) -> None:
         metavar="A=B[:TYPE[:AXIS]]",
         action="append",
         default=[],
-        help="close a loop between two links, bodies or sites: spherical (default), revolute,\n"
+        help="close a loop between two links, bodies, sites or joints: spherical (default), revolute,\n"
         "translational, cylindrical or fixed, about the axis x, y or z (default) of both frames;\n"
         "or a .yaml file with closed_loop: [[A, B], ...] and type: [3d, 6d, ...]; may be given several times",
     )

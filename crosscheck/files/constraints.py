@@ -46,7 +46,7 @@ def unknown(machine: Machine) -> str:
         if loop.axis is None and {ACROSS, ALONG} & set(LOCKED[loop.type]):
             return f"loop {loop.name} without a known axis"
     for coupling in machine.couplings or ():
-        if not {coupling.follower, coupling.leader} - {""} <= single:
+        if not {coupling.follower, *coupling.slopes({})} <= single:
             return f"coupling {coupling.name or coupling.follower} of other joints than hinges and slides"
     return ""
 
@@ -97,12 +97,11 @@ def _rotation(loop: Loop, first: Place, second: Place) -> np.ndarray:
 
 
 def _of_coupling(coupling: Coupling, at: Posed, pose: Mapping[str, float]) -> Constraint:
-    value, law = pose.get(coupling.leader, 0.0), coupling.coefficients
     row = np.zeros(len(at.joints))
     row[at.joints.index(coupling.follower)] = 1.0
-    if coupling.leader:
-        row[at.joints.index(coupling.leader)] -= sum(k * c * value ** (k - 1) for k, c in enumerate(law) if k)
-    error = pose.get(coupling.follower, 0.0) - sum(c * value**k for k, c in enumerate(law))
+    for name, slope in coupling.slopes(pose).items():
+        row[at.joints.index(name)] -= slope
+    error = pose.get(coupling.follower, 0.0) - coupling.value(pose)
     return Constraint("coupling", coupling.follower, np.array([error]), row[None])
 
 

@@ -224,7 +224,11 @@ def _of_couplings(match: Match, tolerance: float) -> Iterator[Difference]:
         elif own.coefficients:
             theirs = own if ending(own.follower) == ending(file.follower) else _inverse(own)
             laws = direct(file, of_file), direct(theirs, of_reader)
-            if not _same(laws[0].coefficients, laws[1].coefficients, tolerance):
+            names = sorted({ending(name) for each in laws for name, _ in each.others})
+            sums = [{ending(name): factor for name, factor in each.others} for each in laws]
+            more = [[each.get(name, 0.0) for name in names] for each in sums]
+            same = _same(laws[0].coefficients, laws[1].coefficients, tolerance)
+            if not (same and _same(more[0], more[1], tolerance)):
                 yield Difference(WRONG, "coupling", file.follower, "law", law(file), law(theirs))
     for own in match.own.couplings:
         if own not in match.couplings.values():
@@ -236,7 +240,9 @@ def direct(coupling: Coupling, others: Sequence[Coupling]) -> Coupling:
     laws = {other.follower: other for other in others}
     for _ in others:
         outer = laws.get(coupling.leader)
-        if outer is None or max(len(coupling.coefficients), len(outer.coefficients)) > LINEAR:
+        if outer is None or coupling.others or outer.others:
+            break
+        if max(len(coupling.coefficients), len(outer.coefficients)) > LINEAR:
             break
         offset, ratio = (*coupling.coefficients, 0.0, 0.0)[:LINEAR]
         first, slope = (*outer.coefficients, 0.0, 0.0)[:LINEAR]
@@ -256,6 +262,7 @@ def law(coupling: Coupling) -> str:
     leader = coupling.leader or "its leader"
     powers = ["", f" {leader}", *(f" {leader}^{k}" for k in range(2, len(coupling.coefficients)))]
     terms = [f"{c:.6g}{power}" for c, power in zip(coupling.coefficients, powers, strict=False) if c]
+    terms += [f"{factor:.6g} {name}" for name, factor in coupling.others]
     return " + ".join(terms) or "0"
 
 

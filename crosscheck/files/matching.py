@@ -10,6 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from crosscheck.engines.loaders.loader import DOUBLE
 from crosscheck.engines.loaders.machine import (
     REVOLUTE,
     SCALAR,
@@ -144,9 +145,18 @@ def _by_name_then(
 
 
 def _alike(match: Match, first: Joint, second: Joint) -> bool:
+    """Return whether two joints of one type have the same bodies, or a hinge the same line."""
     pair = match.in_file(second.bodies)
     own = match.of_file.pair(first.bodies)
-    return first.type == second.type and pair in (own, own[::-1])
+    return first.type == second.type and (pair in (own, own[::-1]) or _same_line(match, first, second))
+
+
+def _same_line(match: Match, first: Joint, second: Joint) -> bool:
+    if first.type != REVOLUTE or None in (first.axis, second.axis, first.anchor, second.anchor):
+        return False
+    axes, points = np.array([first.axis, second.axis]), np.array([first.anchor, second.anchor])
+    apart = np.cross(points[1] - points[0], axes[0])
+    return bool(np.abs(np.cross(*axes)).max() <= DOUBLE and np.abs(apart).max() <= DOUBLE * match.size)
 
 
 def _covered(match: Match) -> dict[str, Joint]:

@@ -38,9 +38,7 @@ def poses(machine: Machine, size: float) -> list[Pose]:
                 pose[joint.name] = float(random.uniform(-most, most)) if number else 0.0
         for coupling in in_order(machine.couplings or ()):
             if coupling.leader in pose or not coupling.leader:
-                value = pose.get(coupling.leader, 0.0)
-                law = enumerate(coupling.coefficients)
-                pose[coupling.follower] = sum(c * value**k for k, c in law)
+                pose[coupling.follower] = coupling.value(pose)
     return found
 
 
@@ -49,7 +47,7 @@ def in_order(couplings: Sequence[Coupling]) -> list[Coupling]:
     waiting, found = list(couplings), list[Coupling]()
     while waiting:
         open_ones = {coupling.follower for coupling in waiting}
-        ready = [c for c in waiting if c.leader not in open_ones] or waiting[:1]
+        ready = [c for c in waiting if open_ones.isdisjoint(c.slopes({}))] or waiting[:1]
         found += ready
         waiting = [c for c in waiting if c not in ready]
     return found
@@ -98,9 +96,9 @@ def reduced(
     columns = {name: np.eye(len(kept))[k] for k, name in enumerate(kept)}
     for coupling in in_order(couplings):
         if coupling.follower not in columns and coupling.leader in columns:
-            at = pose.get(coupling.leader, 0.0)
-            slope = sum(k * c * at ** (k - 1) for k, c in enumerate(coupling.coefficients) if k)
-            columns[coupling.follower] = slope * columns[coupling.leader]
+            slopes = coupling.slopes(pose).items()
+            parts = [slope * columns[n] for n, slope in slopes if n in columns]
+            columns[coupling.follower] = np.sum(parts, axis=0)
     map_ = np.array([columns.get(name, np.zeros(len(kept))) for name in statics.joints])
     map_ = map_.reshape(len(statics.joints), len(kept))
     mass, torque = map_.T @ np.array(statics.mass) @ map_, map_.T @ np.array(statics.gravity)

@@ -1,6 +1,7 @@
 """One MJCF or URDF file for each kind of part: it moves as MuJoCo's own model, or is refused by name."""
 
 import re
+import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 
@@ -33,7 +34,7 @@ REFUSED = {
     "ball_with_armature.xml": "armature of 'x'.*--without armature",
     "ball_with_damper.xml": "stiffness of joint 'x'.*--without springs",
     "circle.urdf": "the joints form a circle",
-    "close_unknown.urdf": "no link, body or site 'fd'; known: world",
+    "close_unknown.urdf": "no link, body, site or joint 'fd'; known: world",
     "fixed_tendon_spring.xml": "tendon 't', which is not a spring between two sites",
     "flexcomp.xml": "1 flexible body.*--without flexible-bodies",
     "floating_on_a_moving_link.urdf": "joint 'F': floats on link 'a', which is not the base of the file",
@@ -57,7 +58,6 @@ REFUSED = {
     "straight_without_gravity.xml": "closure 'e': cannot be closed from this pose; the least gap found",
     "tendon_armature.xml": "armature of tendons t.*--without armature",
     "tendon_limits_and_friction.xml": "friction of tendons t.*--without friction",
-    "tendon_of_three.xml": "equality 'e' of type tendon, which couples 3 joints instead of two",
     "tendon_through_a_pulley.xml": "tendon 's', which is not a spring between two sites",
     "two_parents.urdf": "link 'c': is the child of two joints, 'C' and 'D'",
     "two_roots.urdf": "links 'base', 'stray': no joint carries them",
@@ -117,6 +117,26 @@ def test_pinocchio_builds_the_machine_of_the_urdf(name):
     found = built(Pinocchio(), file.path, file.form, replace(file.asked, states=(), starts=()))
     match = matched(file.machine, found.machine, DOUBLE)
     assert differences(match, file, found, DOUBLE) == [] and not found.faults
+
+
+def test_loop_is_closed_between_joints_as_between_their_child_links():
+    """Joints of a loop are named as frames by users of YAML files of parallel robots."""
+    joints = {joint.find("child").get("link"): joint.get("name") for joint in joints_of("close.urdf")}
+    pair = ImportOptions(close=[f"{joints['fb']}={joints['fc']}"])
+    by_joints = source(KINDS / "close.urdf", pair).imported.scene
+    by_links = found("close.urdf").imported.scene
+    ends = [scene.joint[-1].anchor_pair for scene in (by_joints, by_links)]
+    assert by_joints.joint[-1].type == "spherical" and np.allclose(*ends, rtol=0, atol=1e-15)
+
+
+def joints_of(name):
+    return ET.parse(KINDS / name).getroot().findall("joint")
+
+
+def test_attribute_of_an_older_mujoco_is_named_with_the_version_that_lacks_it(tmp_path):
+    (tmp_path / "old.xml").write_text('<mujoco><option collision="all"/></mujoco>')
+    with pytest.raises(SceneError, match=r"'collision'.*'option'.*MuJoCo \d.* does not have it, older"):
+        source(tmp_path / "old.xml", ImportOptions())
 
 
 def test_included_and_attached_bodies_are_imported_with_their_prefix(tmp_path):

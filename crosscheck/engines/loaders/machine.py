@@ -7,7 +7,7 @@ Units are SI and rad. None stands for a quantity that the format does not state 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -70,12 +70,25 @@ class Loop:
 
 @dataclass(frozen=True)
 class Coupling:
-    """A follower whose displacement from the reference is Σ coefficients[k] · (the leader's)^k."""
+    """A follower whose displacement from the reference is Σ coefficients[k] · (the leader's)^k, and factor ·
+    displacement for each pair (joint, factor) of ``others``."""
 
     name: str
     follower: str
     leader: str
     coefficients: Vector
+    others: tuple[tuple[str, float], ...] = ()
+
+    def value(self, pose: Mapping[str, float]) -> float:
+        """Return the follower's displacement at the displacements of other joints."""
+        found = sum(c * pose.get(self.leader, 0.0) ** k for k, c in enumerate(self.coefficients))
+        return float(found + sum(factor * pose.get(name, 0.0) for name, factor in self.others))
+
+    def slopes(self, pose: Mapping[str, float]) -> dict[str, float]:
+        """Return the derivative of the follower's displacement by each of the leaders'."""
+        at = pose.get(self.leader, 0.0)
+        slope = sum(k * c * at ** (k - 1) for k, c in enumerate(self.coefficients) if k)
+        return ({self.leader: float(slope)} if self.leader else {}) | dict(self.others)
 
 
 @dataclass(frozen=True)

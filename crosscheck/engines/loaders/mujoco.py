@@ -154,11 +154,17 @@ class Compiled(Loaded):
                 continue
             name, law = str(m.equality(e).name) or f"equality {e}", coefficients(*m.eq_data[e, :5])
             row = rows.get(name)
-            if kind == kinds.mjEQ_TENDON and row is None:  # of tendons that are no sum of two coordinates
+            if kind == kinds.mjEQ_TENDON and row is None:  # of tendons that are no sum of coordinates
                 yield Coupling(name, f"tendon {m.tendon(first).name}", "", law)
                 continue
             if kind == kinds.mjEQ_TENDON and row is not None:
-                (first, second), law = row.joints, coefficients(row.offset, row.ratio)
+                joints, factors = list(map(self.joint, row.joints)), [-factor for factor in row.factors]
+                law, others = (
+                    coefficients(row.offset, *factors[1:2]),
+                    zip(joints[2:], factors[2:], strict=True),
+                )
+                yield Coupling(name, joints[0], "".join(joints[1:2]), law, tuple(others))
+                continue
             yield Coupling(name, self.joint(first), self.joint(second) if second >= 0 else "", law)
 
     def dofs(self) -> dict[str, int]:

@@ -75,7 +75,7 @@ class Imported(Loaded):
             loops = [replace(loop, anchors=None) for loop in loops]
             couplings = [replace(coupling, coefficients=()) for coupling in couplings]
         return Machine(
-            bodies=tuple(bodies),
+            bodies=(*bodies, *(Body(f"{name} link", 0.0) for name in self._rods())),
             joints=tuple(tree),
             loops=tuple(loops),
             couplings=tuple(couplings),
@@ -92,14 +92,16 @@ class Imported(Loaded):
     def _tree(self) -> tuple[list[Joint], list[Loop]]:
         """Return the joints that connect new bodies, in the scene's order, and the others as loops."""
         root = {body.name: body.name for body in self.scene.body} | {GROUND: GROUND}
-        tree, loops = list[Joint](), list[Loop]()
-        threads = [c for c in self.scene.coupling if c.joints[0] == c.joints[1]]
+        tree, loops, rods = list[Joint](), list[Loop](), self._rods()
+        threads = [c for c in self.scene.coupling if len(set(c.joints)) == 1]
         pitches = {c.joints[0]: 2 * math.pi * c.gear_ratio for c in threads}
 
         def end(name: str) -> str:
             return name if root[name] == name else end(root[name])
 
         for joint in self.scene.joint:
+            if joint.name in rods.values():
+                continue
             first, second = joint.bodies
             pair = WORLD if first == GROUND else first, WORLD if second == GROUND else second
             anchors = joint.anchor_pair
@@ -108,6 +110,9 @@ class Imported(Loaded):
                 loops.append(Loop(joint.name, joint.type, pair, ends, _axis(joint)))
                 continue
             root[end(second)] = end(first)
+            if joint.name in rods:
+                tree += self._two_hinges(joint, self.scene.joint_named(rods[joint.name]), pair)
+                continue
 
             tree.append(
                 Joint(
@@ -123,6 +128,21 @@ class Imported(Loaded):
         free = [body.name for body in self.scene.body if end(body.name) != end(GROUND)]
         bases = dict.fromkeys(map(end, free))
         return [*(Joint(f"{n} free", "free", (WORLD, n)) for n in bases), *tree], loops
+
+    def _rods(self) -> dict[str, str]:
+        """Return planar joints with the distance joint of the same bodies: two parallel hinges of a massless
+        link, as the importer writes them."""
+        names = {joint.name: joint for joint in self.scene.joint}
+        pairs = [(j, names.get(f"{j.name} distance")) for j in self.scene.joint if j.type == "planar"]
+        return {j.name: d.name for j, d in pairs if d is not None and d.bodies == j.bodies}
+
+    def _two_hinges(self, joint: AnyJoint, rod: AnyJoint, pair: tuple[str, str]) -> list[Joint]:
+        link, axis = f"{joint.name} link", _axis(joint)
+        first, second = (vector(anchor) for anchor in (rod.anchor_pair[0], joint.anchor_pair[1]))
+        return [
+            Joint(joint.name, REVOLUTE, (pair[0], link), first, axis, **self._numbers(joint)),
+            Joint(rod.name, REVOLUTE, (link, pair[1]), second, axis, **self._numbers(rod)),
+        ]
 
     def _numbers(self, joint: AnyJoint) -> dict[str, Any]:
         """Return the numbers of a joint; a scene has neither limits nor dry friction."""
@@ -147,10 +167,12 @@ class Imported(Loaded):
 
     def _couplings(self) -> Iterator[Coupling]:
         for coupling in self.scene.coupling:
-            leader, follower = coupling.joints
+            *more, leader, follower = coupling.joints
+            *factors, of_leader, of_follower = coupling.factors
             if leader != follower:  # the thread of a screw couples two coordinates of one joint
-                law = coefficients(coupling.offset, coupling.gear_ratio)
-                yield Coupling(coupling.name, follower, leader, law)
+                law = coefficients(coupling.offset, -of_leader / of_follower)
+                others = zip(more, (-factor / of_follower for factor in factors), strict=True)
+                yield Coupling(coupling.name, follower, leader, law, tuple(others))
 
         for driver in self.scene.driver:
             yield Coupling(driver.joint, driver.joint, "", ())  # a joint that the file locks
@@ -193,6 +215,8 @@ class Imported(Loaded):
         """Return the run of the scene from a pose and rates."""
         if any(MOVED in message for message in self.messages):
             raise NotImplementedError("the import moved the joints to close the loops")
+        if self._rods():
+            raise NotImplementedError("the scene has no body for a link without mass")
         posed, scene = Posed(self.machine(), pose), self.scene
         v = np.array([rates.get(name, 0.0) for name in posed.joints])
         places = [posed.places[body.name].then(self._place(k)) for k, body in enumerate(scene.body)]

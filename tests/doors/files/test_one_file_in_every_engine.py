@@ -30,7 +30,7 @@ from crosscheck.files.statics import poses
 from crosscheck.files.statics_differences import of_statics
 
 ROUNDING = 1e-12  # m, rad, kg, kg m² of numbers near one, after some rotations
-NOT_OURS = ("spring polynomial", "damping polynomial", "coupling polynomial", "massless link")
+NOT_OURS = ("spring polynomial", "damping polynomial", "coupling polynomial")
 READERS = "tests.helpers.planted_readers"
 LOOP = pair(
     '<connect name="close" body1="lower" body2="other" anchor="0.1 0 0.1"/>'
@@ -107,7 +107,7 @@ def test_corpus_means_what_the_specification_says(form: str, tmp_path: Path):
 @pytest.mark.parametrize("step", [6, pytest.param(1, marks=pytest.mark.slow)], ids=["few", "all"])
 def test_own_import_builds_the_machine_of_each_file_of_the_corpus(step: int, tmp_path: Path):
     """A scene has neither limits nor friction. NOT_OURS are files whose import lists a part that is left
-    out, or describes a massless link by other joints."""
+    out."""
     for case in (case for case in CASES[::step] if case.name not in NOT_OURS):
         path = written(tmp_path, case.text, case.file)
         own = Own().load(path, case.form).machine()

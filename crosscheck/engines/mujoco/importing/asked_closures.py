@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,31 +21,36 @@ GRAMMAR = "frame_a=frame_b[:type[:axis]] or a .yaml file"
 
 
 class Frames:
-    """The named frames of a model: bodies and sites."""
+    """The named frames of a model: bodies, sites and joints; a joint's frame moves with its child link."""
 
-    def __init__(self, mujoco: Any, model: Any, root: str):
-        self.mujoco, self.model, self.root = mujoco, model, root
+    def __init__(self, mujoco: Any, model: Any, root: str, child_links: Mapping[str, str]):
+        self.mujoco, self.model, self.root, self.child_links = mujoco, model, root, child_links
         kinds = mujoco.mjtObj
         self._kinds = (kinds.mjOBJ_SITE, kinds.mjOBJ_BODY)
 
     def find(self, name: str) -> Frame:
-        """Return the frame of a site, body or link; raises SceneError that names similar ones."""
+        """Return the frame of a site, body, link or joint; raises SceneError that names similar ones."""
         if name in (GROUND, "world", self.root):
             return Frame(WORLD, np.zeros(3), np.eye(3))
         site, body = (self.mujoco.mj_name2id(self.model, kind, name) for kind in self._kinds)
         if site >= 0:
             return of_site(self.model, site)
+        joint = self.mujoco.mj_name2id(self.model, self.mujoco.mjtObj.mjOBJ_JOINT, name)
+        if body == -1 and joint >= 0:
+            return Frame(int(self.model.jnt_bodyid[joint]), np.array(self.model.jnt_pos[joint]), np.eye(3))
+        if body == -1 and name in self.child_links:  # a fixed joint
+            return self.find(self.child_links[name])
         if body == -1:
             known = list(self.names())
             near = difflib.get_close_matches(name, known)
             meant = f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(known)}"
-            raise SceneError([f"--close: no link, body or site {name!r}{meant}"])
+            raise SceneError([f"--close: no link, body, site or joint {name!r}{meant}"])
         return Frame(int(body), np.zeros(3), np.eye(3))
 
     def names(self) -> Iterator[str]:
-        """Return the names of all bodies, then of all sites."""
-        model = self.model
-        for kind, count in zip(reversed(self._kinds), (model.nbody, model.nsite), strict=True):
+        """Return the names of all bodies, all sites, then of all joints."""
+        model, kinds = self.model, (*reversed(self._kinds), self.mujoco.mjtObj.mjOBJ_JOINT)
+        for kind, count in zip(kinds, (model.nbody, model.nsite, model.njnt), strict=True):
             yield from filter(None, (self.mujoco.mj_id2name(model, kind, k) for k in range(count)))
 
 

@@ -11,6 +11,7 @@ from crosscheck.engines.mujoco.importing import holding, urdf
 from mbref.formats import ImportOptions
 from mbref.scene import GROUND, SceneError
 
+UNKNOWN = "Schema violation: unrecognized"  # words of MuJoCo about an element or attribute
 SMALLEST = 1e-9  # m; extent of a model that is a rounding error
 
 
@@ -24,7 +25,9 @@ def compiled(mujoco: Any, path: Path, options: ImportOptions) -> tuple[Any, urdf
         text = urdf.prepared(path.read_bytes(), options.hold, str(path))
         model = mujoco.MjModel.from_xml_string(text.text)
     except ValueError as error:
-        raise SceneError([f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}"]) from None
+        said = " ".join(str(error).split())
+        older = f"; MuJoCo {mujoco.__version__} does not have it, older versions may"
+        raise SceneError([f"{path}: MuJoCo cannot read it: {said}{older * (UNKNOWN in said)}"]) from None
     text.take_back(mujoco, model)
     return model, text, []
 

@@ -34,7 +34,7 @@ def of_equalities(mujoco: Any, model: Any) -> Iterator[JointRow | Part | str]:
 
 def removed(mujoco: Any, model: Any, row: JointRow) -> Part:
     """Return the part for a row of coordinates that no scene has, and make its equality inactive."""
-    names = " and ".join(joint_name(model, j) for j in row.joints if j >= 0)
+    names = " and ".join(joint_name(model, j) for j in row.joints)
     e = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_EQUALITY, row.name))
     e = int(row.name.rpartition(" ")[2]) if e < 0 and row.name.startswith("equality ") else e
     if e >= 0:  # a row of a URDF is no equality of the model
@@ -59,8 +59,9 @@ def _row(mujoco: Any, model: Any, e: int, name: str) -> JointRow | Part:
         return Part("couplings", f"{label}, whose polynomial is not linear")
     first = int(model.eq_obj1id[e])
     if kind == kinds.mjEQ_JOINT:
-        pair = first, second if ratio else -1
-        return JointRow(name, pair, offset, ratio if pair[1] >= 0 else 0.0)
+        if second < 0 or not ratio:
+            return JointRow(name, (first,), offset, (1.0,))
+        return JointRow(name, (first, second), offset, (1.0, -ratio))
     return _tendon_row(mujoco, model, name, label, [(first, 1.0), (second, -ratio)], offset)
 
 
@@ -76,11 +77,10 @@ def _tendon_row(
             sums[int(model.wrap_objid[w])] += factor * float(model.wrap_prm[w])
     largest = max(map(abs, sums.values()), default=0.0)
     ends = [j for j, number in sums.items() if abs(number) > ROUNDED * largest]
-    if len(ends) not in (1, 2):
-        return Part("couplings", f"{label}, which couples {len(ends)} joints instead of two")
-    one, other = ends[0], ends[1] if len(ends) == 2 else -1
-    ratio = -sums[other] / sums[one] if other >= 0 else 0.0
-    return JointRow(name, (one, other), offset / sums[one], ratio)
+    if not ends:
+        return Part("couplings", f"{label}, which couples no joints")
+    one = sums[ends[0]]
+    return JointRow(name, tuple(ends), offset / one, tuple(sums[j] / one for j in ends))
 
 
 def _wraps(model: Any, tendon: int) -> tuple[int, int]:

@@ -36,7 +36,7 @@ def needs(model: Any, rows: Sequence[JointRow], laws: Sequence[Law]) -> Needs:
         found[law.joint].add(LOAD)
     for row in rows:
         for j in row.joints:
-            found[j].add(COUPLING if row.joints[1] >= 0 else LOCK)
+            found[j].add(COUPLING if len(row.joints) > 1 else LOCK)
     return found
 
 

@@ -24,13 +24,15 @@ RANK = 1e-9  # singular value / largest singular value; smaller values belong to
 
 @dataclass(frozen=True)
 class JointRow:
-    """A joint coordinate q that follows another coordinate q₂: q = offset + ratio · q₂, both measured from
-    the reference."""
+    """A sum of joint coordinates that is constant: Σ factors[k] · q_k = offset, measured from the reference.
+
+    The first factor is 1. ``joints`` are MuJoCo's numbers.
+    """
 
     name: str
-    joints: tuple[int, int]  # MuJoCo's joint numbers; the second is -1 if the first coordinate is constant
+    joints: tuple[int, ...]
     offset: float
-    ratio: float
+    factors: tuple[float, ...]
 
 
 class Poses:
@@ -191,16 +193,14 @@ class Poses:
         return np.vstack([np.zeros((0, self.model.nv)), *found, *map(self.joint_row, self.joint_rows)])
 
     def joint_row(self, row: JointRow) -> np.ndarray:
-        """Return the Jacobian (1, nv) of a coupled coordinate."""
-        found, (first, second) = np.zeros((1, self.model.nv)), row.joints
-        found[0, self.model.jnt_dofadr[first]] = 1.0
-        if second >= 0:
-            found[0, self.model.jnt_dofadr[second]] -= row.ratio
+        """Return the Jacobian (1, nv) of coupled coordinates."""
+        found = np.zeros((1, self.model.nv))
+        for joint, factor in zip(row.joints, row.factors, strict=True):
+            found[0, self.model.jnt_dofadr[joint]] += factor
         return found
 
     def _residual(self, row: JointRow) -> float:
-        first, second = row.joints
-        return self._moved(first) - row.offset - (row.ratio * self._moved(second) if second >= 0 else 0.0)
+        return sum(f * self._moved(j) for j, f in zip(row.joints, row.factors, strict=True)) - row.offset
 
     def _moved(self, joint: int) -> float:
         address = self.model.jnt_qposadr[joint]

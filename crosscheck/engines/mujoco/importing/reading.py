@@ -165,7 +165,7 @@ class _Reader:
         reference = self.mujoco.MjData(self.model)
         self.mujoco.mj_kinematics(self.model, reference)
         root = root_link(self.text)
-        self.frames = Frames(self.mujoco, self.model, root)
+        self.frames = Frames(self.mujoco, self.model, root, urdf.child_links(self.text))
         found = [] if self._disabled("EQUALITY") else list(of_equalities(self.mujoco, self.model))
         if self.text is not None:
             found += urdf.loops(self.text.root, lambda name: self.frames.find(name).body, reference)
@@ -257,7 +257,7 @@ class _Reader:
         coordinate; rows of coordinates that no scene has are parts to be left out."""
         taken = {joint.name for joint in self.joints}
         for row in list(self.rows):
-            found = [self._coordinate(row, j) for j in row.joints if j >= 0]
+            found = [self._coordinate(row, j) for j in row.joints]
             ends = [end for end in found if end is not None]
             if len(ends) < len(found):
                 self.parts.append(couplings.removed(self.mujoco, self.model, row))
@@ -270,18 +270,17 @@ class _Reader:
             while name in taken:
                 name = f"coupling {name}"
             taken.add(name)
-            (second, of_second), (first, of_first) = ends
-            is_plain = (of_first, of_second) == (first.facts.driven, second.facts.driven)
-            kinds = None if is_plain and first.name != second.name else (of_first, of_second)
-            pair = first.name, second.name
-            where = f"equality {row.name!r}"
-            self.couplings.append(
-                entry(where, Coupling, name=name, joints=pair, ratio=row.ratio, coordinates=kinds)
-            )
+            joints, kinds = zip(*reversed(ends), strict=True)
+            names = tuple(joint.name for joint in joints)
+            driven = tuple(joint.facts.driven for joint in joints)
+            law: dict[str, Any] = {"ratio": -row.factors[1]}
+            law = law if len(names) == 2 else {"ratios": row.factors[::-1]}
+            law["coordinates"] = None if kinds == driven and len(set(names)) == len(names) else kinds
+            self.couplings.append(entry(f"equality {row.name!r}", Coupling, name=name, joints=names, **law))
 
     def _coordinate(self, row: JointRow, j: int) -> tuple[Joint, Coordinate] | None:
         """Return the scene's joint of a hinge or slide in the file, and its coordinate; None without one."""
-        joint, couples = self.joint_of.get(j), row.joints[1] >= 0
+        joint, couples = self.joint_of.get(j), len(row.joints) > 1
         if joint is None or not joint.facts.driven or (joint.type == "cylindrical" and not couples):
             return None
         return joint, ANGLE if kind_of(self.mujoco, self.model, j) == "hinge" else DISPLACEMENT

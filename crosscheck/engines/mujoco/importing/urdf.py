@@ -118,6 +118,13 @@ def _part(element: ET.Element, tag: str, default: dict[str, str]) -> ET.Element:
     return ET.SubElement(element, tag, default) if found is None else found
 
 
+def child_links(text: Text | None) -> dict[str, str]:
+    """Return the child link of each joint of a URDF."""
+    joints = [] if text is None else text.root.iter("joint")
+    ends = {str(joint.get("name")): joint.find("child") for joint in joints}
+    return {name: str(child.get("link")) for name, child in ends.items() if child is not None}
+
+
 def mimics(root: ET.Element, number_of: Callable[[str], int]) -> Iterator[JointRow]:
     """Return joints that follow others by ``<mimic>``; raises SceneError for an unknown joint."""
     for joint in root.iter("joint"):
@@ -127,7 +134,7 @@ def mimics(root: ET.Element, number_of: Callable[[str], int]) -> Iterator[JointR
             if min(pair) < 0:
                 raise SceneError([f"joint {name!r} mimics {other!r}: the file has no such joint that moves"])
             offset, ratio = (float(mimic.get(key, n)) for key, n in (("offset", 0.0), ("multiplier", 1.0)))
-            yield JointRow(f"{name} mimics {other}", pair, offset, ratio)
+            yield JointRow(f"{name} mimics {other}", pair, offset, (1.0, -ratio))
 
 
 def couplings(root: ET.Element) -> Iterator[Part]:
