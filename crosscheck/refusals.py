@@ -7,7 +7,7 @@ import enum
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
-from mbref.scene import Scene
+from mbref.scene import Scene, intermittent
 
 MOST_COUPLED = 2  # coordinates of a coupling of adapters that do not declare sums
 LONGEST_TEXT = 1000  # characters of an engine's message that are kept: about ten lines of a terminal
@@ -75,6 +75,8 @@ class Supports:
         Bodies of mass 0 and inertia 0.
     sums : bool
         Couplings of more than two coordinates.
+    intervals : bool
+        Joints and couplings that hold in intervals of time.
     """
 
     joints: Collection[str] = ()
@@ -85,6 +87,7 @@ class Supports:
     over_time: Collection[str] = ()
     massless_links: bool = False
     sums: bool = False
+    intervals: bool = False
 
     def missing(self, scene: Scene) -> Cannot | None:
         """Return the refusal of the first joint, coupling, driver or load that is not declared.
@@ -105,6 +108,8 @@ class Supports:
     def _missing(self, scene: Scene) -> Iterator[str]:
         links = [] if self.massless_links else [body.name for body in scene.body if body.mass == 0]
         yield from (f"body {name!r} is a massless link" for name in links)
+        if not self.intervals:
+            yield from (f"{path} has intervals" for path in intermittent(scene))
         for joint in scene.joint:
             if joint.type not in self.joints:
                 yield f"joint {joint.name!r} is of type {joint.type!r}"

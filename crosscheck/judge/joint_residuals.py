@@ -18,7 +18,7 @@ import numpy as np
 from crosscheck.judge import time_functions
 from mbref import rotations
 from mbref.rotations import cross
-from mbref.scene import GROUND, Driver, Joint, JointFacts, Scene
+from mbref.scene import GROUND, Driver, Joint, JointFacts, Scene, refuse_intervals
 
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -54,7 +54,8 @@ class JointFrames:
 
 @functools.lru_cache(maxsize=64)
 def joint_frames(scene: Scene) -> tuple[JointFrames, ...]:
-    """Return the frames of the joints of a scene, in its order."""
+    """Return the frames of the joints of a scene, in its order; raises SceneError for intervals."""
+    refuse_intervals(scene)
     drivers = {driver.joint: driver for driver in scene.driver}
     return tuple(_packed(scene, joint, drivers.get(joint.name)) for joint in scene.joint)
 

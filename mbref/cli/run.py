@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 # CPU seconds of a run below which its error is estimated by default, and limit of the second run
 ESTIMATE_SECONDS = 5.0
-SHOWN_POSITIONS = 10  # number of singular positions in the text; --json prints all
+SHOWN_POSITIONS = 10  # number of singular positions, and of events, in the text; --json prints all
 
 
 def add(commands: Any) -> None:
@@ -165,6 +165,8 @@ def show(
     for number, crossing in enumerate((trajectory.crossings or ())[:SHOWN_POSITIONS], 1):
         taken = f"number {crossing.taken} taken" if crossing.taken else "none taken"
         out.print(f"singular position {number} at t = {crossing.time:.6g} s: {crossing.sentence}, {taken}")
+    for event in (trajectory.events or ())[:SHOWN_POSITIONS]:
+        out.print(f"event at t = {event.time:.6g} s: {event.sentence}")
     if not trajectory.times.size:
         return
     out.print("\n".join(_largest(trajectory, units)))

@@ -12,10 +12,9 @@ from mbref.equations.branches import second_order
 from mbref.equations.counts import RANK_TOLERANCE, scaled_jacobian
 from mbref.equations.gaps import is_closed
 from mbref.equations.initial_state import consistent_start, solve_positions
-from mbref.equations.model import Model, displaced
+from mbref.equations.model import Model, displaced, poses
 from mbref.equations.offsets import assembled
 from mbref.linear_algebra.least_norm import null_space
-from mbref.motions.constraints import poses
 from mbref.motions.crossing import Crossing
 from mbref.motions.motion import Motion
 from mbref.motions.trajectory import Outcome

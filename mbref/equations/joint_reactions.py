@@ -48,10 +48,17 @@ def _reactions(
     scene: Scene, times: np.ndarray, q: np.ndarray, multipliers: np.ndarray
 ) -> dict[str, np.ndarray]:
     model = Model(assembled(scene))
-    blocks = model.terms(times, q).blocks
+    found = least_reactions(model, q, model.terms(times, q).blocks, multipliers)
+    model.release()
+    return found
+
+
+def least_reactions(
+    model: Model, q: np.ndarray, blocks: np.ndarray, multipliers: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Return ``reactions`` of least norm, if redundant rows leave a choice and are few."""
     if model.m <= MOST_OPEN_ROWS and model.once(_is_redundant):
         multipliers = _of_least_norm(model, blocks, multipliers)
-    model.release()
     return reactions(model, q, blocks, multipliers)
 
 

@@ -228,6 +228,15 @@ def motion_of(
     }
 
 
+def poses(model: Model, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+    """Return coordinates (k, 7 nb) of positions (k, b, 3) and orientations (k, b, 4) of the bodies."""
+    count, own = position.shape[:2]
+    q = np.tile(model.start(), (count, 1)).reshape(count, model.nb, 7)
+    q[:, :own, :3] = position
+    q[:, :own, 3:] = rotations.multiply(orientation, model.principal[:own])
+    return q.reshape(count, 7 * model.nb)
+
+
 def displaced(q: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Return q ⊕ x: coordinates (7 nb,) moved by (δr, δπ') for each body (6 nb,), see
     ``coordinates.displace``."""

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from mbref.equations.couplings import Coupled, rotors_of
 from mbref.equations.joints import ORIGIN
 from mbref.scene import GROUND, Body, Fixed, Joint, Scene, TimeFunction
+from mbref.scene.structure import refuse_intervals
 
 # name of the frame to which a modelled ground and the rotors of armatures are joined
 FRAME = "the fixed frame"
@@ -44,7 +45,8 @@ class Parts(NamedTuple):
 
 def all_parts(scene: Scene) -> Parts:
     """Return bodies and joints of a scene, with a rotor for each armature, and the ground as a body with six
-    rows if the scene requests it."""
+    rows if the scene requests it. Raises SceneError for constraints with intervals."""
+    refuse_intervals(scene)
     rotors = rotors_of(scene, FRAME)
     bodies, joints = (*scene.body, *rotors.bodies), (*scene.joint, *rotors.joints)
     if scene.ground == "frame":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -10,9 +11,10 @@ import numpy as np
 from mbref import rotations
 from mbref.equations.couplings import couplings_of
 from mbref.equations.joint_reactions import determined_components
-from mbref.equations.model import Model
+from mbref.equations.model import Model, poses
 from mbref.equations.offsets import angles_at_start, assembled
 from mbref.motions.joint_motion import along, joint_motion
+from mbref.motions.pieces import is_intermittent, parts_of
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 
@@ -40,8 +42,10 @@ def violations(scene: Scene, motion: Trajectory) -> Violation:
 
     Rows are defined in ``equations.primitives``: metres, or cosines of axes that stay
     perpendicular and sines of driven angles, which are radians to first order. Angles in rows of couplings
-    count full turns along the trajectory.
+    count full turns along the trajectory.  Constraints with intervals count while they hold.
     """
+    if is_intermittent(scene):
+        return _joined([violations(*part) for part in parts_of(scene, motion)])
     model = Model(without_armatures(assembled(scene)))
     q, v, a = coordinates(model, motion)
     terms = model.terms(motion.times, q, v)
@@ -60,6 +64,17 @@ def violations(scene: Scene, motion: Trajectory) -> Violation:
     )
 
 
+def _joined(parts: Sequence[Violation]) -> Violation:
+    """Return violations of consecutive samples as one; accelerations are missing in all parts, or in none."""
+    position, velocity, acceleration = zip(*parts, strict=True)
+    has_accelerations = all(rows is not None for rows in acceleration)
+    return Violation(
+        np.concatenate(position),
+        np.concatenate(velocity),
+        np.concatenate(acceleration) if has_accelerations else None,
+    )
+
+
 def _from_start(scene: Scene, motion: Trajectory) -> Trajectory:
     """Return the motion with angles that count from its start, as couplings without offsets do."""
     start = angles_at_start(scene)
@@ -68,7 +83,14 @@ def _from_start(scene: Scene, motion: Trajectory) -> Trajectory:
 
 def determined_reactions(scene: Scene, motion: Trajectory) -> dict[str, np.ndarray]:
     """Return for each joint which components (k, 6) of its reaction equilibrium determines, along world
-    axes."""
+    axes. A joint that does not hold has none, which is determined."""
+    if is_intermittent(scene):
+        parts = [
+            (np.ones((len(part.times), 6), dtype=bool), determined_reactions(piece, part))
+            for piece, part in parts_of(scene, motion)
+        ]
+        names = [joint.name for joint in scene.joint]
+        return {name: np.concatenate([own.get(name, every) for every, own in parts]) for name in names}
     model = Model(without_armatures(assembled(scene)))
     q, _, _ = coordinates(model, motion)
     q = q.reshape(len(q), model.nb, 7)
@@ -96,15 +118,6 @@ def coordinates(model: Model, motion: Trajectory) -> tuple[np.ndarray, np.ndarra
     if motion.acceleration is None or motion.angular_acceleration is None:
         return q, v, None
     return q, v, _in_frames(model, p, motion.acceleration, motion.angular_acceleration)
-
-
-def poses(model: Model, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
-    """Return coordinates (k, 7 nb) of positions (k, b, 3) and orientations (k, b, 4) of the bodies."""
-    count, own = position.shape[:2]
-    q = np.tile(model.start(), (count, 1)).reshape(count, model.nb, 7)
-    q[:, :own, :3] = position
-    q[:, :own, 3:] = rotations.multiply(orientation, model.principal[:own])
-    return q.reshape(count, 7 * model.nb)
 
 
 def _in_frames(model: Model, p: np.ndarray, linear: np.ndarray, angular: np.ndarray) -> np.ndarray:

@@ -7,6 +7,8 @@ and -ratio μ to q₁, so that its power is zero.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from mbref import rotations
@@ -19,6 +21,7 @@ from mbref.motions.joint_motion import (
     turned_since_start,
     velocity_of,
 )
+from mbref.motions.pieces import is_intermittent, parts_of
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Joint, Scene
 from mbref.scene.joints import ANGLE, Coordinate
@@ -33,6 +36,8 @@ def driving_forces(scene: Scene, motion: Trajectory) -> dict[str, np.ndarray]:
     Drivers that can replace each other share the load with the least sum of squares. The result is empty if
     the motion lacks a reaction or an acceleration that it needs.
     """
+    if is_intermittent(scene):
+        return _over_pieces([driving_forces(*part) for part in parts_of(scene, motion) if part[1].times.size])
     driven = [scene.joint_named(driver.joint) for driver in scene.driver]
     unknown = [{(joint.name, joint.facts.driven): 1.0} for joint in driven]
     for coupling in scene.coupling:
@@ -46,6 +51,12 @@ def driving_forces(scene: Scene, motion: Trajectory) -> dict[str, np.ndarray]:
     matrix = np.array([[shares.get(coordinate, 0.0) for shares in unknown] for coordinate in coordinates])
     forces = np.linalg.pinv(matrix, rcond=REPLACEABLE) @ np.array(found)
     return {joint.name: size for joint, size in zip(driven, forces, strict=False)}
+
+
+def _over_pieces(parts: Sequence[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """Return forces of consecutive samples as one array (k,) by joint; empty if one part is empty."""
+    names = parts[0] if parts and all(parts) else ()
+    return {name: np.concatenate([part[name] for part in parts]) for name in names}
 
 
 def _demanded(scene: Scene, motion: Trajectory, joint: Joint, coordinate: Coordinate) -> np.ndarray | None:

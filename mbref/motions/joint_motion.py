@@ -33,6 +33,11 @@ class JointMotion:
         Reaction on the second body at its anchor, world frame, N and N m.
     open : ndarray, shape (k,), or None
         Number of reaction components that equilibrium does not determine.
+    active : ndarray, shape (k,), or None
+        1 where the joint constrains, otherwise 0. None in a scene whose constraints always hold.
+    impulse, angular_impulse : ndarray, shape (k, 3), or None
+        Sum of the impulses of force (N s) and of moment (N m s) at events up to each sample, on the second
+        body at its anchor, world frame. None in a scene whose constraints always hold.
     """
 
     name: str
@@ -44,6 +49,9 @@ class JointMotion:
     force: np.ndarray | None
     moment: np.ndarray | None
     open: np.ndarray | None = None
+    active: np.ndarray | None = None
+    impulse: np.ndarray | None = None
+    angular_impulse: np.ndarray | None = None
 
     def __repr__(self) -> str:
         has = [key for key in ("angle", "displacement", "force") if getattr(self, key) is not None]
@@ -65,7 +73,18 @@ def joint_motion(scene: Scene, motion: Trajectory, name: str) -> JointMotion:
     wrench = (motion.reactions or {}).get(name)
     force, moment = (None, None) if wrench is None else (wrench[:, :3], wrench[:, 3:])
     marks = (motion.open_reactions or {}).get(name)
-    return JointMotion(name, angle, rate, slid, speed, rotations.to_vector(relative), force, moment, marks)
+    turning = rotations.to_vector(relative)
+    return JointMotion(name, angle, rate, slid, speed, turning, force, moment, marks, *_events(joint, motion))
+
+
+def _events(joint: Joint, motion: Trajectory) -> tuple[np.ndarray | None, ...]:
+    """Return where a joint constrains (k,), and the sums (k, 3) of its impulses; None without events."""
+    if motion.events is None:
+        return None, None, None
+    total = np.zeros((len(motion.times), 6))
+    for event in motion.events:
+        total[motion.times >= event.time] += event.impulses.get(joint.name, np.zeros(6))
+    return np.array([int(joint.is_active(t)) for t in motion.times]), total[:, :3], total[:, 3:]
 
 
 def along(found: JointMotion, coordinate: Coordinate) -> tuple[np.ndarray, np.ndarray]:

@@ -22,7 +22,7 @@ from mbref.motions.joint_motion import JointMotion, joint_motion
 from mbref.motions.maxima import ReactionMaxima, reaction_maxima
 from mbref.motions.output_units import in_units
 from mbref.motions.outputs import all_columns, chosen
-from mbref.motions.restart import scene_at
+from mbref.motions.pieces import restarted
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 
@@ -107,9 +107,10 @@ class Motion(Trajectory):
         Raises
         ------
         InputError
-            If the motion has no sample at t; the message has the nearest one.
+            If the motion has no sample at t; the message has the nearest one. If a joint with intervals
+            engages later and has to meet a given pose, or has axes on both bodies.
         """
-        return scene_at(self.mechanism, self, t)
+        return restarted(self.mechanism, self, t)
 
     def driver(self, joint: str) -> DriverMotion:
         """Return force (N) or torque (N m), and power (W), that the driver of a joint supplies.
@@ -140,6 +141,13 @@ class Motion(Trajectory):
             If the scene has no such load.
         """
         return load_motion(self.mechanism, self, place)
+
+    @property
+    def impulses(self) -> dict[str, np.ndarray]:
+        """Impulses at the events, by joint, shape (events, 6): force (N s) and moment (N m s) on the second
+        body at its anchor, world frame; zero where a joint does not hold. Empty without events."""
+        names, found = [joint.name for joint in self.mechanism.joint], [e.impulses for e in self.events or ()]
+        return {name: np.array([each.get(name, np.zeros(6)) for each in found]) for name in names if found}
 
     @property
     def violation(self) -> Violation:

@@ -30,6 +30,7 @@ TURNING = "a joint that turns about one axis"
 SLIDING = "a joint that slides along one axis"
 LOAD_ABOUT_AXIS = "a load about a joint's axis"
 LOAD_ALONG_AXIS = "a load along a joint's axis"
+SOMETIMES = "joints or couplings with intervals (`active`)"
 PULLING = f"a spring, or {LOAD_ALONG_AXIS}"
 
 
@@ -83,6 +84,9 @@ OUTPUTS = (
     ),
     Output("joint", "force", "N", "xyz", "reaction on the second body at its anchor, world", MASSES),
     Output("joint", "moment", "N m", "xyz", "reaction moment on the second body, world", MASSES),
+    Output("joint", "active", "", "", "1 where the joint constrains, else 0", SOMETIMES),
+    Output("joint", "impulse", "N s", "xyz", "sum of its impulses of force so far, world", SOMETIMES),
+    Output("joint", "angular_impulse", "N m s", "xyz", "sum of its impulses of moment, world", SOMETIMES),
     Output(
         "driver",
         "force",

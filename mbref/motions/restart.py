@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbref import rotations
-from mbref.equations.model import Model
+from mbref.equations.model import Model, poses
 from mbref.equations.offsets import angles_at_start, assembled
 from mbref.equations.placed import placed_with_springs
 from mbref.input_error import InputError
@@ -22,11 +21,8 @@ def scene_at(scene: Scene, motion: Trajectory, t: float) -> Scene:
     k = _sample(motion, t)
     start = assembled(scene)
     model = Model(start)
-    q = model.start().reshape(-1, 7).copy()
-    for b, body in enumerate(scene.body):
-        place = motion.bodies.index(body.name)
-        q[b, :3] = motion.position[k, place]
-        q[b, 3:] = rotations.multiply(motion.orientation[k, place], model.principal[b])
+    order = [motion.bodies.index(body.name) for body in scene.body]
+    q = poses(model, motion.position[k : k + 1, order], motion.orientation[k : k + 1, order])
     model.release()
     angles, turned = angles_at_start(scene), {}
     for number, load in enumerate(scene.load):
@@ -36,15 +32,12 @@ def scene_at(scene: Scene, motion: Trajectory, t: float) -> Scene:
             turned[number] = float(angle[k]) - angles[load.joint]
             if np.isnan(turned[number]):
                 raise InputError(f"scene_at: the motion has lost count of the turns of joint {load.joint!r}")
-    placed, at = placed_with_springs(model, q.ravel(), turned), float(motion.times[k])
+    placed, at = placed_with_springs(model, q[0], turned), float(motion.times[k])
     bodies = [
         body.model_copy(update={"velocity": tuple(v.tolist()), "angular_velocity": tuple(w.tolist())})
         for body, v, w in zip(
             placed.body,
-            *(
-                each[k, [motion.bodies.index(b.name) for b in scene.body]]
-                for each in (motion.velocity, motion.angular_velocity)
-            ),
+            *(each[k, order] for each in (motion.velocity, motion.angular_velocity)),
             strict=True,
         )
     ]

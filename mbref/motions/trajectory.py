@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mbref.motions.crossing import Crossing
+from mbref.motions.event import Event
 
 
 class Outcome(enum.Enum):
@@ -109,7 +110,6 @@ class Trajectory:
 
     It behaves as a dictionary of the bodies' motions by name: ``motion["rod"]``, ``"rod" in motion``,
     ``for name in motion``, ``len(motion)``. Two trajectories are equal if they are one object.
-
     k sample times were reached, the scene has nb bodies, and all vectors are in the world frame.
 
     Attributes
@@ -136,6 +136,8 @@ class Trajectory:
     crossings : sequence of Crossing, or None
         Singular positions that the run crossed, or the one at which it ended. None if the method or engine
         does not look for them.
+    events : tuple of Event, or None
+        Times at which constraints begin or cease to hold. None if constraints always hold.
     outcome : Outcome
         How the run ended.
     t_end : float
@@ -171,6 +173,7 @@ class Trajectory:
     crossings: Sequence[Crossing] | None = None
     open_reactions: Mapping[str, np.ndarray] | None = None
     angles: Mapping[str, np.ndarray] | None = None
+    events: tuple[Event, ...] | None = None
 
     def __repr__(self) -> str:
         return (
@@ -225,10 +228,8 @@ class Trajectory:
             Numbers of the method or engine.
         bodies : tuple of str
             Names of the scene's bodies.
-        outcome : Outcome
-            How the run ended.
-        message : str
-            One sentence on the end of the run.
+        outcome, message : Outcome and str
+            How the run ended, and one sentence on its end.
 
         Returns
         -------
@@ -268,6 +269,7 @@ class Trajectory:
             "open_reactions": None if self.open_reactions is None else _lists(self.open_reactions),
             "angles": None if self.angles is None else _lists(self.angles),
             "crossings": None if self.crossings is None else [c.to_record() for c in self.crossings],
+            "events": None if self.events is None else [event.to_record() for event in self.events],
             "metrics": {},
             "cost": {f.name: getattr(self.cost, f.name) for f in fields(Cost)},
         }
@@ -288,8 +290,8 @@ class Trajectory:
         Trajectory
             The trajectory, with arrays as attributes.
         """
-        names = tuple(record["bodies"])
-        k, crossings = len(record["times"]), record.get("crossings")
+        names, k = tuple(record["bodies"]), len(record["times"])
+        crossings, events = record.get("crossings"), record.get("events")
         marks, angles = record.get("open_reactions"), record.get("angles")
 
         def stacked(key: str, width: int) -> np.ndarray:
@@ -318,6 +320,7 @@ class Trajectory:
             outcome=Outcome[record["outcome"]],
             cost=Cost(**record["cost"]),
             crossings=None if crossings is None else tuple(Crossing.from_record(c) for c in crossings),
+            events=None if events is None else tuple(map(Event.from_record, events)),
         )
 
 

@@ -39,6 +39,7 @@ from mbref.scene.loads import (
     TorsionSpring,
 )
 from mbref.scene.scene import Scene
+from mbref.scene.structure import intermittent, refuse_intervals
 from mbref.scene.validation import GROUND, SceneError
 
 __all__ = [
@@ -73,4 +74,6 @@ __all__ = [
     "TorsionSpring",
     "Translational",
     "Universal",
+    "intermittent",
+    "refuse_intervals",
 ]

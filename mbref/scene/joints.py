@@ -19,7 +19,6 @@ from mbref.scene.fields import (
     PointValue,
     RotorInertia,
     RotorMass,
-    SceneEntry,
     VectorPair,
     VectorValue,
     as_list,
@@ -27,6 +26,7 @@ from mbref.scene.fields import (
     direction,
     shown,
 )
+from mbref.scene.intervals import Intermittent
 
 X, Y, Z = 0, 1, 2
 SKEW = 0.05  # largest cosine between the axes of a universal joint that counts as a rounded right angle
@@ -83,7 +83,7 @@ class JointFacts:
         return angle + ((DISPLACEMENT,) if self.forbidden_translations == (X, Y) else ())
 
 
-class JointEntry(SceneEntry):
+class JointEntry(Intermittent):
     """Fields and facts that all joints have."""
 
     facts: ClassVar[JointFacts]
@@ -252,7 +252,7 @@ JOINT_TYPES: dict[str, type[Joint]] = {
 }
 
 
-class Coupling(SceneEntry):
+class Coupling(Intermittent):
     """q₂ = offset + ratio · q₁ of two joint coordinates, or Σ ratios[k] q_k = offset of two or more: gears,
     racks, belts, screws, mimic joints; differentials, pulleys, planetary gears.
 

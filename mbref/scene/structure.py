@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,12 +10,26 @@ import numpy as np
 from mbref.rotations import Vector3
 from mbref.scene.fields import COINCIDENT
 from mbref.scene.loads import Spring
-from mbref.scene.validation import GROUND
+from mbref.scene.validation import GROUND, SceneError
 
 if TYPE_CHECKING:
     from mbref.scene.scene import Scene
 
 SAME_DIRECTION = 1e-12  # 1 - cosine of the angle of axes that count as parallel
+
+
+def intermittent(scene: Scene) -> Iterator[str]:
+    """Yield the path of each joint and coupling that has intervals, such as ``joint[latch].active``."""
+    yield from (f"joint[{joint.name}].active" for joint in scene.joint if joint.active is not None)
+    yield from (f"coupling[{each.name}].active" for each in scene.coupling if each.active is not None)
+
+
+def refuse_intervals(scene: Scene) -> None:
+    """Raise SceneError for the first constraint with intervals, where only one set of constraints can be."""
+    for path in intermittent(scene):
+        raise SceneError(
+            [f"{path}: only motions have intervals (mbref run, plot, animate); remove them here"]
+        )
 
 
 def has_massless(scene: Scene) -> bool:

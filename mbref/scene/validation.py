@@ -14,6 +14,7 @@ from mbref.printable import printable
 from mbref.scene.coupling_faults import coordinate_faults, count_faults
 from mbref.scene.fields import checked_length, checked_size, field_of, is_some, meant, shown
 from mbref.scene.function_faults import Faults, factor_faults, listed, table_faults, unit_faults
+from mbref.scene.interval_faults import interval_faults
 from mbref.scene.joints import JOINT_TYPES
 from mbref.scene.loads import LOAD_TYPES, JointLoad
 from mbref.scene.shapes import SHAPE_TYPES
@@ -40,7 +41,9 @@ NUMBERS = {  # field → content of its list; all other lists contain three numb
     "joints": "two or more names of joints",
     "coordinates": 'a list of "angle" and "displacement"',
     "ratios": "numbers, one for each joint",
+    "active": "intervals of a begin and an end (s), such as [[0.0, 1.2], [2.0, 3.0]]",
 }
+PAIRS = {"table": "a time and a value", "active": "a begin and an end (s)"}  # field → pairs in its list
 INERTIA_TOLERANCE = 1e-9  # relative, of the triangle inequality: equality holds for thin rods
 
 
@@ -124,8 +127,8 @@ def field_faults(error: ValidationError, tables: Mapping[str, Sequence[str]]) ->
 def _must_hold(location: Sequence[str | int], got: str) -> str:
     """Return the message for a list of the wrong length, or a value that is no list."""
     field = location[-1] if location else ""
-    if isinstance(field, int) and location[-2:-1] == ("table",):
-        return f"must be a time and a value, got {got}"
+    if isinstance(field, int) and len(location) > 1 and location[-2] in PAIRS:
+        return f"must be {PAIRS[str(location[-2])]}, got {got}"
     return f"must be {NUMBERS.get(str(field), 'three numbers')}, got {got}"
 
 
@@ -199,6 +202,7 @@ def reference_faults(data: Mapping[str, Any]) -> Faults:
     types = {_text(joint, "name"): _text(joint, "type") for joint in joints}
     yield from _coupling_faults(data, types)
     yield from _driver_faults(data, types)
+    yield from interval_faults(data)
     for i, load in enumerate(_entries(data, "load")):
         acts_on = ACTS_ON.get(_text(load, "type"))
         if acts_on == "body":

@@ -14,13 +14,16 @@ from typing import Any
 
 import numpy as np
 
+from mbref.equations.model import Model
+from mbref.equations.offsets import assembled
 from mbref.input_error import InputError
 from mbref.method import MOST_BODIES, OWN, SERIES_METHOD, Method, MethodError, crossing_method
 from mbref.motions.error_estimate import ErrorEstimate, distances, rounding
 from mbref.motions.motion import Motion
+from mbref.motions.pieces import first_piece
 from mbref.scene import Scene, SceneError
 from mbref.scene.structure import bushings
-from mbref.simulation.simulate import checked_run, finish_run
+from mbref.simulation.simulate import simulate
 from mbref.stepping.limits import AUTO, FINEST, GENERATED, Limits
 
 # order of the Taylor series of the second run; other runs use at most order 22 at tolerances above 1e-13
@@ -29,6 +32,7 @@ ORDER = 24
 RTOL_SERIES, RTOL_EXPLICIT = 1e-13, 1e-12
 OWN_LIKE = "lm1"  # built-in method with adaptive steps and without projection, as an own formulation
 TIGHTER = 0.1  # factor on the motion's own tolerance, if that gives a smaller tolerance
+TIMES = ("duration", "active")  # fields of a scene that are not perturbed
 UNIT = 2.0**-52  # largest relative distance between neighbouring doubles
 LONGER = "; --estimate yes and with_error_estimate have no time limit"
 
@@ -122,7 +126,7 @@ def perturbed(scene: Scene) -> Scene:
 
     def changed(value: Any) -> Any:
         if isinstance(value, dict):
-            return {key: item if key == "duration" else changed(item) for key, item in value.items()}
+            return {key: item if key in TIMES else changed(item) for key, item in value.items()}
         if isinstance(value, list):
             return [changed(item) for item in value]
         return value * (1.0 + random.uniform(-2.0, 2.0) * UNIT) if isinstance(value, float) else value
@@ -200,10 +204,9 @@ def _run(
 ) -> _Made:
     """Return a run within the time limit of second runs."""
     try:
-        run = checked_run(scene(), method, times, limits)
-        motion = finish_run(run, check)
+        own = scene()
+        motion = simulate(own, method, times, limits, check)
     except (SceneError, MethodError, InputError, _TooLong) as error:
         return _Made(None, 1.0, str(error))
-    length = run.model.length
-    run.release()
+    length = Model(assembled(first_piece(own))).length
     return _Made(motion, length, f"the second run ended at t = {motion.t_end:.3g} s: {motion.message}")

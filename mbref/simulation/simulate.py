@@ -24,6 +24,7 @@ from mbref.method import (
     may_be_series,
 )
 from mbref.motions.motion import Motion
+from mbref.motions.pieces import is_intermittent
 from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
 from mbref.scene.structure import bushings
@@ -107,20 +108,38 @@ def simulate(
     times = checked_times(np.linspace(0.0, scene.duration, SAMPLES) if times is None else times)
     if times[-1] > scene.duration and any(function.periodic for function in functions_of(scene)):
         scene = scene.with_(duration=float(times[-1]))  # periodic tables repeat up to there
+    run = _run_of(method, formulation, stabilisation, limits)
+    if not is_intermittent(scene):
+        return run(scene, times, progress)
+    from mbref.simulation.piecewise import simulate_pieces  # only such scenes need it
+
+    return simulate_pieces(scene, times, run, progress, limits)
+
+
+def _run_of(
+    method: Method | str | None,
+    formulation: Callable[[Matrices], Any] | None,
+    stabilisation: Any,
+    limits: Limits,
+) -> Callable[[Scene, np.ndarray, ProgressCall], Motion]:
+    """Return the function that runs a scene, of constraints that always hold, at times (k,), s."""
     if formulation is not None:
         if method is not None:
             raise InputError("give a method or a formulation of your own, not both")
         from mbref.simulation.own_formulation import simulate_own  # only such runs need it
 
-        return simulate_own(scene, formulation, stabilisation, times, limits, progress)
+        return lambda scene, times, progress: simulate_own(
+            scene, formulation, stabilisation, times, limits, progress
+        )
     if stabilisation != "none":
         raise InputError("stabilisation: needs a formulation of your own; otherwise name it in the method")
     if method is None:
-        return _by_default(scene, times, limits, progress)
-    return _by(Method.parse(method) if isinstance(method, str) else method, scene, times, limits, progress)
+        return lambda scene, times, progress: _by_default(scene, times, limits, progress)
+    by = Method.parse(method) if isinstance(method, str) else method
+    return lambda scene, times, progress: run_by(by, scene, times, limits, progress)
 
 
-def _by(method: Method, scene: Scene, times: np.ndarray, limits: Limits, progress: ProgressCall) -> Motion:
+def run_by(method: Method, scene: Scene, times: np.ndarray, limits: Limits, progress: ProgressCall) -> Motion:
     """Return the motion of a scene by a method."""
     run = checked_run(scene, method, times, limits)
     motion = finish_run(run, progress)
@@ -134,10 +153,10 @@ def _by_default(scene: Scene, times: np.ndarray, limits: Limits, progress: Progr
     chosen = default_method(scene)
     if limits.branches or limits.code == GENERATED:
         chosen = crossing_method(scene)
-    motion = _by(Method.parse(chosen), scene, times, limits, progress)
+    motion = run_by(Method.parse(chosen), scene, times, limits, progress)
     if chosen == SERIES_METHOD or motion.outcome is Outcome.COMPLETED or not may_be_series(scene):
         return motion
-    followed = _by(Method.parse(SERIES_METHOD), scene, times, limits, progress)
+    followed = run_by(Method.parse(SERIES_METHOD), scene, times, limits, progress)
     return followed if followed.t_end > motion.t_end else motion
 
 

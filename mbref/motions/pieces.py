@@ -1,0 +1,271 @@
+"""Pieces of a motion, between the times at which joints and couplings begin or cease to constrain.
+
+The scene of a piece has the constraints that hold in it, and starts at the poses of its first moment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbref import rotations
+from mbref.equations.gaps import gaps
+from mbref.equations.model import Model, poses
+from mbref.input_error import InputError
+from mbref.motions.event import STATE_BEFORE, Event
+from mbref.motions.joint_motion import along, joint_motion, positions_of, turned_since_start
+from mbref.motions.restart import scene_at
+from mbref.motions.trajectory import PER_BODY, Trajectory
+from mbref.scene import Coupling, Joint, Scene, SceneError
+from mbref.scene.structure import intermittent
+
+if TYPE_CHECKING:
+    from mbref.scene.intervals import Intermittent
+
+POSE_MET = (
+    1e-6  # gap (lengths of the mechanism, or rad) of a given pose that counts as met; the run leaves less
+)
+NEARLY_PARALLEL = 0.1  # sine of the angle of the axes of a universal joint, below which it cannot engage
+ALWAYS: dict[str, Any] = {"active": None, "engages": "anywhere"}
+
+
+def is_intermittent(scene: Scene) -> bool:
+    """Return whether a joint or a coupling has intervals."""
+    return any(True for _ in intermittent(scene))
+
+
+def event_times(scene: Scene, end: float) -> list[float]:
+    """Return the times (s) after 0, up to an end, at which a constraint begins or ceases to hold."""
+    every = (interval for each in (*scene.joint, *scene.coupling) for interval in each.active or ())
+    return sorted({time for interval in every for time in interval if 0.0 < time <= end})
+
+
+def first_piece(scene: Scene) -> Scene:
+    """Return the scene with the constraints that hold at t = 0."""
+    return scene.with_(**_holding(scene, 0.0))
+
+
+def _holding(scene: Scene, t: float) -> dict[str, list[Any]]:
+    """Return the joints and couplings that hold from t (s) on, as in the file, without intervals."""
+    return {
+        key: [each.model_copy(update=ALWAYS) for each in getattr(scene, key) if each.is_active(t)]
+        for key in ("joint", "coupling")
+    }
+
+
+def changes(scene: Scene, t: float) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names of the joints and couplings that begin, and that cease, to constrain at t (s)."""
+    every: tuple[Intermittent, ...] = (*scene.joint, *scene.coupling)
+    ends = [{interval[side] for interval in each.active or ()} for side in (0, 1) for each in every]
+    names = [each.name for each in (*scene.joint, *scene.coupling)]
+    begun, ceased = ends[: len(every)], ends[len(every) :]
+    return (
+        tuple(name for name, times in zip(names, begun, strict=True) if t in times),
+        tuple(name for name, times in zip(names, ceased, strict=True) if t in times),
+    )
+
+
+def next_piece(scene: Scene, piece: Scene, state: Trajectory, t: float) -> tuple[Scene, Scene]:
+    """Return two scenes that start at t (s): with the constraints and velocities before t, and with the
+    constraints from t on.
+
+    ``piece`` is the scene of the piece before, and ``state`` the state at t, with all turns since t = 0.
+    Raises SceneError if a constraint cannot engage there.
+    """
+    frame, placed = scene_at(_always(scene), state, t), scene_at(_bare(piece), state, t)
+    before = {joint.name: joint for joint in placed.joint}
+    engaged, _ = changes(scene, t)
+    holding = _holding(scene, t)
+    joints = [
+        _engaged(scene, scene.joint_named(name), state, t) if name in engaged else before[name]
+        for name in (joint.name for joint in holding["joint"])
+    ]
+    for coupling in scene.coupling:
+        if coupling.name in engaged and coupling.engages == "given_pose":
+            _refuse_coupling(scene, coupling, state, t)
+    couplings = [each.model_copy(update={"offset": 0.0}) for each in holding["coupling"]]
+    old = frame.with_(joint=placed.joint, coupling=placed.coupling)
+    return old, frame.with_(joint=joints, coupling=couplings)
+
+
+def _always(scene: Scene) -> Scene:
+    """Return the scene with the joints that always hold only, on which drivers and loads act."""
+    return scene.with_(joint=[joint for joint in scene.joint if joint.active is None], coupling=())
+
+
+def _bare(scene: Scene) -> Scene:
+    """Return the scene without loads and drivers."""
+    return scene.with_(load=(), driver=())
+
+
+def _engaged(scene: Scene, joint: Joint, state: Trajectory, t: float) -> Joint:
+    """Return a joint of the scene that begins to hold at the poses of t (s): its anchor and its axis are
+    those that the first body carries, in the file."""
+    if joint.engages == "given_pose":
+        _refuse_gap(scene, joint, state, t)
+    ends = [
+        tuple(positions_of(scene, state, body, [point])[0, 0].tolist())
+        for body, point in zip(joint.bodies, joint.anchor_pair, strict=True)
+    ]
+    turned = [turned_since_start(scene, state, body) for body in joint.bodies]
+    axes = [
+        rotations.rotate(q, np.array([axis]))[0] for q, axis in zip(turned, joint.directions, strict=False)
+    ]
+    if len(axes) > 1:
+        axes[1] = _across(joint, axes[0], axes[1], t)
+    given = [tuple(axis.tolist()) for axis in axes]
+    every: dict[str, Any] = {"anchor": ends[0], "anchors": ends, "axis": given and given[0], "axes": given}
+    moved = {key: value for key, value in every.items() if key in type(joint).model_fields}
+    try:
+        return type(joint)(**{**joint.model_dump(exclude={"type"}), **moved, **ALWAYS})
+    except SceneError as fault:
+        raise cannot_hold(joint.name, t, fault.faults[0]) from None
+
+
+def _across(joint: Joint, first: np.ndarray, second: np.ndarray, t: float) -> np.ndarray:
+    """Return the part (3,) of the second axis of a universal joint that is perpendicular to its first axis;
+    raises SceneError if the axes are nearly parallel."""
+    unit = rotations.unit(first)
+    part = second - (second @ unit) * unit
+    if np.linalg.norm(part) < NEARLY_PARALLEL * np.linalg.norm(second):
+        raise cannot_hold(joint.name, t, "its axes are nearly parallel")
+    return np.asarray(part)
+
+
+def _refuse_gap(scene: Scene, joint: Joint, state: Trajectory, t: float) -> None:
+    """Raise SceneError if the poses of t (s) do not obey a joint as the file gives it."""
+    alone = joint.model_copy(update=ALWAYS)
+    bodies = [body.model_copy(update={"mass": 1.0, "inertia": (1.0, 1.0, 1.0)}) for body in scene.body]
+    model = Model(scene.with_(body=bodies, joint=[alone], coupling=(), driver=(), load=()))
+    q = poses(model, state.position, state.orientation)
+    terms = model.terms(np.array([t]), q)
+    worst = int(gaps(terms, np.array([model.length]))[0].argmax())
+    gap, size = float(gaps(terms, np.array([model.length]))[0, worst]), abs(float(terms.phi[0, worst]))
+    model.release()
+    if gap > POSE_MET:
+        raise cannot_hold(joint.name, t, f"the given pose is missed by {size:.3g} m or rad")
+
+
+def _refuse_coupling(scene: Scene, coupling: Coupling, state: Trajectory, t: float) -> None:
+    """Raise SceneError if the coordinates of t (s) do not obey a coupling with its offset."""
+    if (gap := abs(_sum(scene, coupling, state) - coupling.offset)) > POSE_MET:
+        raise cannot_hold(
+            coupling.name, t, f"the sum of its coordinates misses the offset by {gap:.3g} m or rad"
+        )
+
+
+def _sum(scene: Scene, coupling: Coupling, state: Trajectory) -> float:
+    """Return the sum of factor times coordinate of a coupling, m or rad, at a state."""
+    ends = zip(scene.coupled(coupling), coupling.factors, strict=True)
+    terms = (
+        factor * along(joint_motion(scene, state, joint.name), kind)[0][0] for (joint, kind), factor in ends
+    )
+    return float(sum(terms))
+
+
+def cannot_hold(name: str, t: float, why: str) -> SceneError:
+    """Return the error of a constraint that cannot begin to hold at t (s), with the reason."""
+    return SceneError([f"{name}.active: cannot begin to hold at t = {t:.6g} s: {why}"])
+
+
+def parts_of(scene: Scene, motion: Trajectory) -> Iterator[tuple[Scene, Trajectory]]:
+    """Yield the scene of each piece of a motion, without loads, and the samples in it, from its begin.
+
+    Raises InputError for a motion without events, whose constraints are not known.
+    """
+    if motion.events is None:
+        raise InputError(
+            f"the motion of {scene.name!r} by {motion.engine} has no events (joints with intervals)"
+        )
+    held = {
+        key: [each.model_copy(update={"engages": "anywhere"}) for each in getattr(scene, key)]
+        for key in ("joint", "coupling")
+    }
+    bare = scene.with_(load=(), **held)
+    piece, begin, turned = first_piece(bare), 0.0, dict[str, float]()
+    for event in (*motion.events, None):
+        end = np.inf if event is None else event.time
+        yield piece, _samples(motion, (motion.times >= begin) & (motion.times < end), begin, turned)
+        if event is not None:
+            _, piece = next_piece(bare, piece, state_at(motion, event), event.time)
+            begin, turned = event.time, dict(event.angles)
+
+
+def restarted(scene: Scene, motion: Trajectory, t: float) -> Scene:
+    """Return ``scene_at``, also for constraints with intervals, which then count from t (s).
+
+    Raises InputError for a joint that engages later, and needs the poses of the first scene: it has to meet
+    a given pose, or has axes on both bodies.
+    """
+    if not is_intermittent(scene):
+        return scene_at(scene, motion, t)
+    frame = scene_at(_always(scene), motion, t)
+    at = scene.duration - frame.duration if scene.duration > t else t
+    pieces = [(piece, part.times) for piece, part in parts_of(scene, motion)]
+    piece = pieces[sum(event.time <= at for event in motion.events or ())][0]
+    placed = {joint.name: joint for joint in scene_at(_bare(piece), motion, t).joint}
+    chosen = np.abs(motion.times - at).argmin()
+    state = _samples(motion, np.arange(len(motion.times)) == chosen, 0.0, {})
+    joints, couplings = [], []
+    for joint in scene.joint:
+        later = _from_time(joint, at)
+        if joint.name in placed:
+            joints.append(placed[joint.name].model_copy(update={**later, "engages": joint.engages}))
+        elif later["active"]:
+            if joint.engages == "given_pose" or len(joint.directions) > 1:
+                raise InputError(
+                    f"scene_at: joint {joint.name!r} engages later by geometry of the first scene"
+                )
+            joints.append(_engaged(scene, joint, state, at).model_copy(update=later))
+    for coupling in scene.coupling:
+        later = _from_time(coupling, at)
+        holds = coupling.is_active(at)
+        offset = 0.0 if holds else coupling.offset - _sum(scene, coupling, state)
+        if holds or later["active"]:
+            couplings.append(coupling.model_copy(update={**later, "offset": offset}))
+    return frame.with_(joint=joints, coupling=couplings)
+
+
+def _from_time(constraint: Intermittent, t: float) -> dict[str, Any]:
+    """Return the intervals of a constraint that end after t (s), as times since t."""
+    if constraint.active is None:
+        return {"active": None}
+    return {"active": tuple((max(begin - t, 0.0), end - t) for begin, end in constraint.active if end > t)}
+
+
+def _samples(motion: Trajectory, chosen: np.ndarray, begin: float, turned: Mapping[str, float]) -> Trajectory:
+    """Return the chosen (k,) samples, with times (s) and angles (rad) from the begin of a piece."""
+
+    def part(values: Any) -> Any:
+        return None if values is None else values[chosen]
+
+    def parts(values: Mapping[str, Any] | None) -> Any:
+        return None if values is None else {name: part(each) for name, each in values.items()}
+
+    angles = {name: part(each) - turned.get(name, 0.0) for name, each in (motion.angles or {}).items()}
+    return replace(
+        motion,
+        times=motion.times[chosen] - begin,
+        **{key: part(getattr(motion, key)) for key in PER_BODY},
+        reactions=parts(motion.reactions),
+        open_reactions=parts(motion.open_reactions),
+        angles=angles,
+        events=None,
+    )
+
+
+def state_at(motion: Trajectory, event: Event) -> Trajectory:
+    """Return the state before an event as a trajectory of one sample."""
+    none: dict[str, Any] = dict.fromkeys(
+        ("acceleration", "angular_acceleration", "reactions", "open_reactions", "events")
+    )
+    return replace(
+        motion,
+        times=np.array([event.time]),
+        **{key: getattr(event, key)[None] for key in STATE_BEFORE},
+        **none,
+        angles={name: np.array([angle]) for name, angle in event.angles.items()},
+    )

@@ -1,0 +1,212 @@
+"""Motions with joints and couplings that come and go: one run for each piece between events, and the impacts
+between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from mbref.equations.impacts import impact
+from mbref.equations.lazy import LazyMapping, LazySequence
+from mbref.input_error import InputError
+from mbref.motions.crossing import Crossing
+from mbref.motions.event import STATE_BEFORE, Event
+from mbref.motions.motion import Motion
+from mbref.motions.pieces import cannot_hold, changes, event_times, first_piece, next_piece
+from mbref.motions.trajectory import PER_BODY, Cost, Outcome, Trajectory
+from mbref.scene import Joint, Scene, SceneError
+from mbref.scene.bodies import DRIVER
+from mbref.stepping.limits import Limits
+from mbref.stepping.run import missing_masses
+
+Reached = Callable[[float], None] | None
+RunOfPiece = Callable[[Scene, np.ndarray, Reached], Motion]  # of a scene, at times (k,), s
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """The run of a piece that begins at a time (s): its motion, and the number of samples to be shown."""
+
+    begin: float
+    motion: Motion
+    shown: int
+
+
+def simulate_pieces(
+    scene: Scene, times: np.ndarray, run: RunOfPiece, progress: Reached, limits: Limits
+) -> Motion:
+    """Return the motion at times (k,), s, of a scene with constraints that come and go.
+
+    Raises SceneError if a constraint cannot begin to hold, or if a body has no mass, and InputError for
+    branches, whose numbers count the singular positions of one piece.
+    """
+    if limits.branches:
+        raise InputError("branches: cannot be chosen in a scene whose joints or couplings have intervals")
+    if not scene.has_mass():
+        raise SceneError(missing_masses(scene))
+    begins = [0.0, *event_times(scene, float(times[-1]))]
+    piece, pieces, events, turned = first_piece(scene), [], [], dict[str, float]()
+    for begin, end in zip(begins, [*begins[1:], None], strict=True):
+        own = times[(times >= begin) & (times < end)] if end else times[times >= begin]
+        local = own - begin if end is None else np.append(own - begin, end - begin)
+        motion = run(piece, local if local.size else np.zeros(1), _later(progress, begin))
+        pieces.append(_Piece(begin, motion, min(own.size, len(motion.times))))
+        if end is None or motion.outcome is not Outcome.COMPLETED:
+            break
+        state = _end(motion, end, turned)
+        turned = {name: float(angles[0]) for name, angles in (state.angles or {}).items()}
+        before, piece = next_piece(scene, piece, state, end)
+        piece, event = _event(scene, before, piece, state, turned)
+        events.append(event)
+    return _joined(scene, times, pieces, events)
+
+
+def _later(progress: Reached, begin: float) -> Reached:
+    """Return the progress call of a piece that begins at a time (s)."""
+    return None if progress is None else lambda reached: progress(begin + reached)
+
+
+def _end(motion: Motion, t: float, turned: dict[str, float]) -> Trajectory:
+    """Return the last state of a piece at a time t (s), with the angles (rad) that joints turned before."""
+    last = {key: getattr(motion, key)[-1:] for key in STATE_BEFORE}
+    angles = {name: each[-1:] + turned.get(name, 0.0) for name, each in (motion.angles or {}).items()}
+    kept = {each.name: getattr(motion, each.name) for each in fields(Trajectory)}
+    others = dict.fromkeys(("acceleration", "angular_acceleration", "reactions", "open_reactions", "events"))
+    return Trajectory(**{**kept, **others, **last, "times": np.array([t]), "angles": angles})
+
+
+def _event(
+    scene: Scene, before: Scene, after: Scene, state: Trajectory, turned: Mapping[str, float]
+) -> tuple[Scene, Event]:
+    """Return the scene after an event, with its velocities, and the event."""
+    t = float(state.times[0])
+    engaged, released = changes(scene, t)
+    try:
+        found = impact(before, after)
+    except SceneError as fault:
+        raise cannot_hold(", ".join(engaged), t, fault.faults[0]) from None
+    bodies = [
+        body.model_copy(update={"velocity": tuple(v.tolist()), "angular_velocity": tuple(w.tolist())})
+        for body, v, w in zip(after.body, found.velocity, found.angular_velocity, strict=True)
+    ]
+    event = Event(
+        time=t,
+        engaged=engaged,
+        released=released,
+        **{key: getattr(state, key)[0] for key in STATE_BEFORE},
+        velocity_after=found.velocity,
+        angular_velocity_after=found.angular_velocity,
+        angles={joint.name: turned[joint.name] for joint in scene.joint if _is_counted(joint)},
+        impulses={name: wrench * bool(engaged) for name, wrench in found.impulses.items()},
+        open=found.open,
+        energy_before=found.energy[0],
+        energy_after=found.energy[1],
+    )
+    return after.with_(body=bodies), event
+
+
+def _joined(scene: Scene, times: np.ndarray, pieces: Sequence[_Piece], events: Sequence[Event]) -> Motion:
+    """Return the pieces as one motion at times (k,), s, up to the end of the last piece."""
+    motions, first, last = [piece.motion for piece in pieces], pieces[0].motion, pieces[-1]
+    shown = sum(piece.shown for piece in pieces)
+    arrays: dict[str, Any] = {
+        key: None
+        if any(getattr(motion, key) is None for motion in motions)
+        else np.concatenate([getattr(piece.motion, key)[: piece.shown] for piece in pieces])
+        for key in PER_BODY
+    }
+    is_complete = last.motion.outcome is Outcome.COMPLETED
+    return replace(
+        first,
+        mechanism=scene,
+        times=times[:shown],
+        **arrays,
+        reactions=_wrenches(scene, pieces),
+        open_reactions=_marks(scene, pieces),
+        angles=_angles(scene, pieces),
+        crossings=_crossings(pieces),
+        events=tuple(events),
+        outcome=last.motion.outcome,
+        t_end=float(times[-1]) if is_complete else last.begin + last.motion.t_end,
+        message=_message(pieces),
+        cost=Cost(*(sum(getattr(m.cost, f.name) for m in motions) for f in fields(Cost))),
+    )
+
+
+def _message(pieces: Sequence[_Piece]) -> str:
+    """Return the messages of the pieces, each with its begin, and other methods than the first piece's."""
+    sentences = []
+    for piece in pieces:
+        other = piece.motion.method != pieces[0].motion.method
+        said = "; ".join(filter(None, (f"by {piece.motion.method}" * other, piece.motion.message)))
+        if said and piece.begin:
+            said = f"from t = {piece.begin:.6g} s, from which times count here: {said}"
+        sentences.append(said)
+    return "; ".join(filter(None, sentences))
+
+
+def _wrenches(scene: Scene, pieces: Sequence[_Piece]) -> Any:
+    names = tuple(joint.name for joint in scene.joint)
+    return LazyMapping(names, _over_pieces, names, pieces, "reactions", (6,))
+
+
+def _marks(scene: Scene, pieces: Sequence[_Piece]) -> Any:
+    if any(piece.motion.open_reactions is None for piece in pieces):
+        return None
+    names = [joint.name for joint in scene.joint]
+    names += [DRIVER.format(driver.joint) for driver in scene.driver]
+    return LazyMapping(tuple(names), _over_pieces, tuple(names), pieces, "open_reactions", ())
+
+
+def _over_pieces(
+    names: Sequence[str], pieces: Sequence[_Piece], field: str, shape: tuple[int, ...]
+) -> dict[str, np.ndarray]:
+    """Return numbers (k, ...) by name over all pieces, zero in a piece that does not have the name."""
+    found: dict[str, np.ndarray] = {}
+    for name in names:
+        parts = []
+        for piece in pieces:
+            own = getattr(piece.motion, field) or {}
+            has = name in own
+            parts.append(own[name][: piece.shown] if has else np.zeros((piece.shown, *shape), dtype=int))
+        found[name] = np.concatenate(parts)
+    return found
+
+
+def _is_counted(joint: Joint) -> bool:
+    """Return whether the turns of a joint are counted: it always holds and turns about one axis."""
+    return joint.active is None and joint.facts.turns
+
+
+def _angles(scene: Scene, pieces: Sequence[_Piece]) -> dict[str, np.ndarray]:
+    """Return the angles (k,), rad, since t = 0 of the joints that always hold and turn about one axis."""
+    found = {}
+    for joint in scene.joint:
+        if _is_counted(joint):
+            total, parts = 0.0, []
+            for piece in pieces:
+                angles = np.asarray((piece.motion.angles or {})[joint.name])
+                parts.append(total + angles[: piece.shown])
+                total += float(angles[-1]) if angles.size else 0.0
+            found[joint.name] = np.concatenate(parts)
+    return found
+
+
+def _crossings(pieces: Sequence[_Piece]) -> Any:
+    """Return the singular positions of all pieces; None if a method does not look for them."""
+    if any(piece.motion.crossings is None for piece in pieces):
+        return None
+    count = sum(len(piece.motion.crossings or ()) for piece in pieces)
+    return LazySequence(range(count), _later_crossings, pieces) if count else ()
+
+
+def _later_crossings(pieces: Sequence[_Piece]) -> tuple[Crossing, ...]:
+    """Return the singular positions of all pieces, with times from the start of the motion."""
+    return tuple(
+        replace(crossing, time=piece.begin + crossing.time)
+        for piece in pieces
+        for crossing in piece.motion.crossings or ()
+    )
