@@ -51,7 +51,8 @@ def test_reference_of_an_awkward_mechanism_is_within_its_bound(kind, seed):
 
 
 def test_both_formulations_of_the_reference_agree_on_a_gimbal():
-    """Before, formulation B accepted a collocation step whose points did not resolve the motion."""
+    """Collocation steps that do not resolve the motion between their points are refused; accepted, they would
+    part the formulations."""
     scene, times = awkward("gimbal", 0), np.linspace(0.0, 0.12, 4)
     a, b = (move(scene, times, EXTENDED, seconds=SECONDS) for move in (natural_motion, tree_motion))
     assert not a.reason and not b.reason
@@ -59,8 +60,8 @@ def test_both_formulations_of_the_reference_agree_on_a_gimbal():
 
 
 def test_collocation_steps_with_an_ill_conditioned_mass_matrix_are_accepted():
-    """Thirty freedoms, condition number 1e6. Before, formulation B found no step short enough in 0.03 s;
-    fewer than ten are needed. Formulation A gives the motion, less exactly by the condition number."""
+    """Thirty freedoms, condition number 1e6: formulation B needs fewer than ten steps in 0.03 s. Formulation
+    A gives the motion, less exactly by the condition number."""
     scene, times = awkward("chain_of_twenty", 0), np.linspace(0.0, 0.03, 3)
     a, b = (move(scene, times, EXTENDED, seconds=SECONDS) for move in (natural_motion, tree_motion))
     assert not b.reason and b.steps < 10

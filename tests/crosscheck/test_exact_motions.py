@@ -35,8 +35,8 @@ def test_gausss_principle_gives_the_true_motion(name):
 
 @pytest.mark.parametrize("name", ["point_pendulum", "bricard_thin"])
 def test_gausss_principle_accelerates_bodies_without_moments_of_inertia_as_the_reference(name):
-    """Their mass matrix is singular. Before, its Cholesky factorisation failed. The reference solves
-    equations of its own in long doubles; differences are rounding (1e-12 of the largest acceleration)."""
+    """Their mass matrix is singular and has no Cholesky factor. The reference solves equations of its own in
+    long doubles; differences are rounding (1e-12 of the largest acceleration)."""
     scene = SCENES[name]()
     motion = natural_motion(scene, [0.0], EXTENDED, seconds=100.0)
     angular = scene_length(scene) * motion.angular_acceleration[0]

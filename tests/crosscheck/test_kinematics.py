@@ -177,7 +177,7 @@ def test_second_driver_of_a_four_bar_at_another_rate_is_refused():
 
 
 @pytest.mark.parametrize("order", [("ground", "second"), ("second", "ground")])
-def test_joint_coordinates_count_the_turns_put_in(order):
+def test_coordinates_of_a_cylindrical_joint_count_its_full_turns(order):
     """A body turns about its axis by 9 t + 3 sin 4 t, up to 21 rad, and slides by 0.4 t², up to 1.6 m."""
     got, wanted = cylinder_coordinates(order, np.linspace(0.0, 2.0, 81))
     assert np.abs(got - wanted).max() < 100 * ROUNDED, f"off by {np.abs(got - wanted).max()} after 21 rad"

@@ -91,7 +91,7 @@ def test_driving_a_crank_beyond_its_reach_ends_the_run_at_the_dead_position(meth
 @pytest.mark.parametrize("seed", range(4))
 def test_release_near_the_flat_position_takes_few_steps_and_loses_no_energy(seed, distance):
     """The crank starts at rest, ``distance`` (rad) from the flat pose; gravity and rigid joints lose no
-    energy. Before, steps were 1e-4 of the distance: 92 000 steps lost 2e-4 of the energy."""
+    energy. Steps of 1e-4 of the distance would be 92 000 and lose 2e-4 of the energy."""
     crank, frame, _, _ = drawn(seed)
     run = simulate(four_bar(pins(crank, frame, distance)), "taylor", [0.0, 0.3], Limits(rtol=1e-10))
     assert run.outcome.label == "COMPLETED" and run.cost.steps < 100, (run.message, run.cost.steps)

@@ -164,7 +164,7 @@ def test_every_scene_of_an_ensemble_starts_at_its_own_offset():
 
 
 def test_drawing_shows_the_assembled_pose():
-    """``at_rest`` is the motion of one sample that a drawing shows."""
+    """``at_rest`` is the motion of one sample that a drawing shows, ``still`` the drawing as SVG."""
     scene = shifted(rack, "teeth", 0.05)
     assert np.array_equal(at_rest(scene).position, at_rest(mbref.assembled(scene)).position)
     assert mbref.still(scene) != mbref.still(rack())

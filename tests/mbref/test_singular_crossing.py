@@ -134,7 +134,7 @@ def test_swing_that_turns_back_before_the_flat_position_meets_its_closed_form_an
 )
 def test_crossings_of_a_chain_flat_in_both_loops_are_all_recorded(rtol):
     """Ten crossings in 10 s; the determinant keeps its sign at each. The motion is periodic: every second
-    crossing follows after one period, to 1e-4 s. Before, a run recorded six."""
+    crossing follows after one period, to 1e-4 s."""
     run = simulate(find_scene("four_bar_chain[2]"), "taylor", np.linspace(0.0, 10.0, 3), Limits(rtol=rtol))
     times = np.array([crossing.time for crossing in run.crossings])
     assert run.outcome.name == "COMPLETED" and len(times) == 10
@@ -145,8 +145,7 @@ def test_crossings_of_a_chain_flat_in_both_loops_are_all_recorded(rtol):
 @pytest.mark.parametrize("loop", SWINGING)
 def test_release_very_near_the_flat_position_is_right_or_undecided(loop):
     """Distances of 1e-8 to 1e-5 rad: below 5e-6 rad rounding may turn the motion from rest, and a run may end
-    UNDECIDED; its message says so if it ends at the start. Before, a run at 4e-8 rad completed 1.9e-6 off,
-    more than 1000 rtol."""
+    UNDECIDED; its message says so if it ends at the start. Right means off by at most 1000 rtol."""
     for distance in np.geomspace(1e-8, 1e-5, 16):
         scene = SWINGING[loop](-distance)
         run = simulate(scene, "taylor", np.linspace(0.0, 1.5, 21))
@@ -289,8 +288,8 @@ def turned_back(angle: float, distance: float) -> Scene:
 
 @pytest.mark.parametrize("distance", [0.0, 1e-9, 1e-8])
 def test_no_run_whose_driver_turns_back_at_the_flat_position_completes_on_another_branch(distance):
-    """After 1 s the driver is at its first angle, and so is the parallelogram, unless rounding changed the
-    branch where it turned back. Runs are UNDECIDED. Before, some completed on the other branch."""
+    """After 1 s the driver is at its first angle, and so is the parallelogram, to 1e-6 m, unless rounding
+    changed the branch where it turned back. Such runs must end UNDECIDED."""
     for angle in np.linspace(0.3, 0.9, 20):
         scene = turned_back(float(angle), distance)
         run = simulate(scene, "taylor", [1.0])

@@ -108,8 +108,8 @@ def test_regularised_method_crosses_the_flat_position_of_a_rhombus_as_its_closed
 @pytest.mark.parametrize("rtol", [1e-5, 1e-8])
 @pytest.mark.parametrize("loops", [2, 3, 5, 12])
 def test_run_ends_where_all_loops_of_a_chain_are_flat(loops, rtol):
-    """With an even number of loops the determinant keeps its sign there. The time is the closed form's, to
-    0.5 ms. Before, runs went on."""
+    """With an even number of loops the determinant keeps its sign there, so that its sign does not show the
+    position. The time is the closed form's, to 0.5 ms."""
     scene = find_scene(f"four_bar_chain[{loops}]")
     run = simulate(scene, "alf-dual+projection", [2.0], Limits(rtol=rtol))
     assert run.outcome.name == "SINGULAR_POSITION", run.message
@@ -119,7 +119,7 @@ def test_run_ends_where_all_loops_of_a_chain_are_flat(loops, rtol):
 @pytest.mark.parametrize("rtol", [1e-5, 1e-8])
 @pytest.mark.parametrize("loops", [2, 6, 10])
 def test_chain_of_slider_cranks_completes_though_single_pivots_vanish(loops, rtol):
-    """Single pivots vanish twice a turn of a crank, but the rank stays. Before, runs ended at 0.032 s."""
+    """Single pivots vanish twice a turn of a crank, but the rank stays."""
     scene, times = find_scene(f"slider_crank_chain[{loops}]"), np.linspace(0.0, 0.4, 5)
     run = simulate(scene, "alf-dual+projection", times, Limits(rtol=rtol))
     assert relative_error(run, scene) < 100.0 * rtol

@@ -132,7 +132,8 @@ def test_run_of_a_microsecond_from_a_singular_position_is_exact():
 @pytest.mark.parametrize("linkage", [four_bar, five_bar])
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_driven_loop_starts_up_to_1e_7_rad_from_flat_and_moves_as_its_closed_form(linkage, side):
-    """Distances of 1e-11 to 1.6e-7 rad on both sides. Before, nearly half of the runs were undecided."""
+    """Distances of 1e-11 to 1.6e-7 rad on both sides. The driver, not rounding, decides the branch: no run is
+    undecided."""
     for distance in (1.6e-7, 1e-7, 4e-8, 1.6e-8, 6.3e-9, 1.6e-9, 1e-9, 4e-10, 1e-11):
         scene = linkage(math.pi + side * distance)
         run = simulate(scene, "taylor", np.linspace(0.0, 0.05, 6), Limits(rtol=1e-9))
@@ -187,7 +188,7 @@ def test_spherical_loop_leaves_the_flat_position_on_the_branch_of_its_velocities
 
 
 def test_start_near_the_flat_position_of_a_spherical_loop_does_not_shorten_later_steps():
-    """Fewer than 100 steps. Before, rows counted as nearly dependent to the end of a run: 200 000 steps."""
+    """Fewer than 100 steps. Rows that count as nearly dependent beyond the start would take 200 000 steps."""
     scene = spherical_loop(0.3, 0.6, 1e-4, (2.0, 2.0 * ratio(0.3, 0.6)))
     centred = scene.with_("joint[B].anchor", (0.0, 0.0, 0.0)).with_("joint[D].anchor", (0.0, 0.0, 0.0))
     run = simulate(centred, "taylor", [1.0], Limits(rtol=1e-6))

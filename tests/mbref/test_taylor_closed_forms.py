@@ -56,8 +56,8 @@ def test_quaternion_of_a_spinning_body_is_continuous_over_full_turns(axis):
 
 @pytest.mark.slow
 def test_phase_of_a_fast_top_is_exact_after_3000_radians():
-    """The truth is the judge's reference; 1e-9 rad are 100 rtol. Before, rounding was magnified, and the
-    phase was off by 6e-7 rad."""
+    """The truth is the judge's reference; 1e-9 rad are 100 rtol. Rounding of the fast spin must not be
+    magnified."""
     scene = SCENES["heavy_top"]().with_(duration=4.0)
     times = np.linspace(0.0, scene.duration, 5)
     run = simulate(scene, "taylor", times, Limits(rtol=1e-11))

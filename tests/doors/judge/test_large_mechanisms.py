@@ -58,7 +58,7 @@ def test_large_mechanisms_differ_in_their_numbers_of_parts_loops_and_redundant_r
 
 
 def test_reduction_drops_bodies_and_keeps_the_loops_that_a_violation_needs():
-    """The violation stands for each mechanism of three loops or more: three bodies suffice for them."""
+    """Here each mechanism of three loops or more has the violation; three bodies suffice for three loops."""
     small = fewer_bodies(large_graph(11), lambda scene: loops(scene) >= 3)
     assert len(small.body) <= 3 and loops(small) >= 3
     assert all(body.velocity is None for body in small.body)
