@@ -45,20 +45,9 @@ def inertia(random) -> tuple[float, np.ndarray]:
 
 
 IDIOMS = (
-    "hinge",
-    "hinge",
-    "slide",
-    "ball",
-    "universal",
-    "cylindrical",
-    "planar",
-    "three hinges",
-    "rod",
-    "free",
-    "parallel",
-    "skew",
-    "fixed",
-)
+    "hinge", "hinge", "slide", "ball", "universal", "cylindrical", "planar", "three hinges", "rod", "free",
+    "parallel", "skew", "fixed",
+)  # fmt: skip
 
 
 def motions(idiom: str, random) -> list[tuple[str, np.ndarray, np.ndarray]]:

@@ -11,23 +11,17 @@ from crosscheck.conformance.runners import InProcess
 from crosscheck.engine import BUILT_IN, engine
 
 SPECIMENS = {specimen.scene.name: specimen for specimen in specimens()}
+LAWFUL = tuple(name for name, specimen in SPECIMENS.items() if specimen.keeps)
 QUICK = ("heavy top", "universal joint", "cylindrical driver", "door", "floating pair", "two drivers")
+BY_ROUNDING = "dense and sparse LU start redundant rows with zero accelerations, or not, by rounding"
 KNOWN: dict[tuple[str, str, str], str] = {  # (engine, scene, check): why it fails
     ("pinocchio", "drawn loop", "in millimetres"): "mu of the proximal solver is absolute, chosen for metres",
     ("mujoco", "oscillator", "duplicated"): "motions 2.3e-6 apart, allowed 1e-6; not analysed",
     ("mujoco", "flying ring", "momenta"): "the halves of a soft closure's force act at points that are apart",
     ("mujoco", "whirling crank", "passive"): "the integrator implicit feeds energy",
     ("mujoco", "whirling crank", "similar"): "default closures have a time constant of 20 ms at every size",
-    (
-        "exudyn",
-        "whirling crank",
-        "similar",
-    ): "dense and sparse LU start redundant rows with zero accelerations, or not, by rounding",
-    (
-        "exudyn",
-        "whirling crank",
-        "distant",
-    ): "dense and sparse LU start redundant rows with zero accelerations, or not, by rounding",
+    ("exudyn", "whirling crank", "similar"): BY_ROUNDING,
+    ("exudyn", "whirling crank", "distant"): BY_ROUNDING,
     ("pinocchio", "whirling crank", "similar"): "mu of lcaba is absolute",
     ("pinocchio", "whirling crank", "distant"): "lcaba expresses inertias of size 1/mu at the origin",
 }
@@ -57,25 +51,15 @@ def test_built_in_engine_violates_no_check_on_six_probes(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_built_in_engine_violates_no_check_on_couplings(name):
-    """Scenes with gears, racks and screws, whose motions are known in closed form."""
-    found = violations(name, tuple(make()[0].name for make in GEARED), related=False)
-    assert not found, found
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", BUILT_IN)
-def test_built_in_engine_violates_only_known_relations(name):
-    """Motions of turned, scaled or reversed scenes follow from the motion; KNOWN has the reasons."""
-    scenes = RELATED
-    found = violations(name, scenes, related=True)
-    assert set(found) == known(name, scenes), found
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", BUILT_IN)
-def test_built_in_engine_breaks_only_known_laws_in_its_families_and_ways(name):
-    """Momenta, energy, similarity and distance; findings and the page on invariants have the numbers."""
-    scenes = tuple(scene for scene, specimen in SPECIMENS.items() if specimen.keeps)
-    found = violations(name, scenes, related=False)
+@pytest.mark.parametrize(
+    ("scenes", "related"),
+    [
+        pytest.param(tuple(make()[0].name for make in GEARED), False, id="gears, racks and screws"),
+        pytest.param(RELATED, True, id="turned, scaled and reversed scenes"),
+        pytest.param(LAWFUL, False, id="momenta, energy, similarity and distance"),
+    ],
+)
+def test_built_in_engine_violates_only_known_checks_of_couplings_relations_and_laws(name, scenes, related):
+    """KNOWN has the reasons; findings and the page on invariants have the numbers of laws."""
+    found = violations(name, scenes, related)
     assert set(found) == known(name, scenes), found

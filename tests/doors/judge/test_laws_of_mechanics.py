@@ -22,27 +22,13 @@ from tests.helpers.short_motions import CROSSED, MOTIONS
 LIMIT = 60.0  # CPU s of a reference; each takes about 0.2
 STEP = 1e-4  # between five samples, of the duration: differences of fourth order are exact to about 1e-8
 QUICK = (  # one for each kind of joint, load, driver and coupling
-    "arm with planar",
-    "arm with distance, bodies exchanged",
-    "arm with translational",
-    "loop with inline",
-    "loop with cylindrical",
-    "pendulum with spring with damping",
-    "pendulum with torsion spring",
-    "pendulum with slide spring",
-    "pendulum with moment",
-    "pendulum with force over time",
-    "pendulum with joint torque",
-    "driven slide",
-    "driven angle of the second joint",
-    "driven gears",
-    "planet with armatures",
-    "coupled displacements",
-    "screw with armature",
-    "free bodies and a spring",
-    "doubled hinge",
-    "point_pendulum",
-)
+    "arm with planar", "arm with distance, bodies exchanged", "arm with translational", "loop with inline",
+    "loop with cylindrical", "pendulum with spring with damping", "pendulum with torsion spring",
+    "pendulum with slide spring", "pendulum with moment", "pendulum with force over time",
+    "pendulum with joint torque", "driven slide", "driven angle of the second joint", "driven gears",
+    "planet with armatures", "coupled displacements", "screw with armature", "free bodies and a spring",
+    "doubled hinge", "point_pendulum",
+)  # fmt: skip
 ALL = [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in MOTIONS if n not in CROSSED]
 
 
