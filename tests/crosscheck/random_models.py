@@ -45,9 +45,20 @@ def inertia(random) -> tuple[float, np.ndarray]:
 
 
 IDIOMS = (
-    "hinge", "hinge", "slide", "ball", "universal", "cylindrical", "planar", "three hinges", "rod", "free",
-    "parallel", "skew", "fixed",
-)  # fmt: skip
+    "hinge",
+    "hinge",
+    "slide",
+    "ball",
+    "universal",
+    "cylindrical",
+    "planar",
+    "three hinges",
+    "rod",
+    "free",
+    "parallel",
+    "skew",
+    "fixed",
+)
 
 
 def motions(idiom: str, random) -> list[tuple[str, np.ndarray, np.ndarray]]:

@@ -28,9 +28,16 @@ STEP = 1e-3  # s
 ORDERS = {"padmm, moreau": 2.0, "dvi": 1.0}
 # largest errors measured on the four-bar over 0.2 s at this step
 ERRORS = {
-    "padmm, moreau": 6.3e-5, "dvi, moreau": 7.2e-5, "lox, moreau": 6.3e-5, "dvi": 3.7e-4, "lox": 7.5e-5,
-    "defaults": 3.7e-4, "mujoco": 6.5e-5, "xpbd": 8.4e-3, "semi-implicit": 7.8e-3,
-}  # fmt: skip
+    "padmm, moreau": 6.3e-5,
+    "dvi, moreau": 7.2e-5,
+    "lox, moreau": 6.3e-5,
+    "dvi": 3.7e-4,
+    "lox": 7.5e-5,
+    "defaults": 3.7e-4,
+    "mujoco": 6.5e-5,
+    "xpbd": 8.4e-3,
+    "semi-implicit": 7.8e-3,
+}
 MARGIN = 1.5  # on the measured errors, which are errors of the method and not of rounding
 SINGLE = 1e-6  # some roundings of Newton's single precision, 6e-8
 

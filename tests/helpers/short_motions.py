@@ -350,12 +350,24 @@ def doubled_hinge() -> Scene:
 # Built-in mechanisms, for a short time; the last ones pass singular positions.
 
 SHORT = {
-    "four_bar_gravity": 0.3, "five_bar_gravity": 0.3, "spatial_slider_crank": 0.05,
-    "spatial_slider_crank_driven": 0.03, "planar_slider_crank": 0.1, "planar_slider_crank_gravity": 0.1,
-    "andrews_squeezer": 0.01, "bricard": 0.2, "flyball_governor": 0.1, "rigid_slider_crank": 0.1,
-    "heavy_top": 0.1, "bennett": 0.3, "sarrus": 0.1, "h_frame": 0.3, "point_pendulum": 0.3,
-    "four_bar_chain[3]": 0.2, "slider_crank_chain[2]": 0.05,
-}  # fmt: skip
+    "four_bar_gravity": 0.3,
+    "five_bar_gravity": 0.3,
+    "spatial_slider_crank": 0.05,
+    "spatial_slider_crank_driven": 0.03,
+    "planar_slider_crank": 0.1,
+    "planar_slider_crank_gravity": 0.1,
+    "andrews_squeezer": 0.01,
+    "bricard": 0.2,
+    "flyball_governor": 0.1,
+    "rigid_slider_crank": 0.1,
+    "heavy_top": 0.1,
+    "bennett": 0.3,
+    "sarrus": 0.1,
+    "h_frame": 0.3,
+    "point_pendulum": 0.3,
+    "four_bar_chain[3]": 0.2,
+    "slider_crank_chain[2]": 0.05,
+}
 CROSSED = {  # duration, s, and number of singular positions that the motion passes
     "planar_slider_crank_equal": (0.1, 1),
     "four_bar": (0.03, 1),

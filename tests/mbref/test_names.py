@@ -10,9 +10,17 @@ from mbref.motions.trajectory import Trajectory
 from mbref.scene import Body, Scene
 
 NAMES = (
-    "[red]x[/]", "[/nothing]", "$x_1$", "../../up", "a/b", "<b>&amp;</b>", "a|b", "Türe α", "%s {0}",
+    "[red]x[/]",
+    "[/nothing]",
+    "$x_1$",
+    "../../up",
+    "a/b",
+    "<b>&amp;</b>",
+    "a|b",
+    "Türe α",
+    "%s {0}",
     "ground ",
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize("name", NAMES)
