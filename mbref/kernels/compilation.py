@@ -19,6 +19,7 @@ import os
 import sys
 import types as types_of_python
 from collections.abc import Callable, Sequence
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,7 @@ NO_WRAPPERS: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": T
 CONFIG: Any = numba.config  # numba creates the names of this module when it is imported
 PLAIN = bool(CONFIG.DISABLE_JIT)
 Function = Callable[..., Any]
+_method = ContextVar("method", default="")  # whose kernels are prepared
 
 VECTOR = types.Array(f8, 1, "C")
 MATRIX = types.Array(f8, 2, "C")
@@ -147,13 +149,13 @@ class Exchangeable:
         if PLAIN:
             return self.function
         if not is_writable(CACHE):
-            _begin_compiling()
+            _begin_compiling(_method.get())
             return self._compile(cache=False)
         begin(CACHE)
         remove_damaged(CACHE, self.function)
         with contextlib.nullcontext() if self.is_kept else held(self._lock):
             if not self.is_kept:
-                _begin_compiling()
+                _begin_compiling(_method.get())
             compiled = self._compile()
             if not self._is_loaded(compiled):
                 record_files(CACHE)
@@ -227,12 +229,12 @@ def entry(signature: Signature) -> Callable[[Function], Entry]:
     return lambda function: Entry(function, signature)
 
 
-def prepare_all(kernels: Sequence[Exchangeable]) -> None:
-    """Compile kernels, or load them from the cache.
+def prepare_all(kernels: Sequence[Exchangeable], method: str = "") -> None:
+    """Compile the kernels of a method, or load them from the cache.
 
     Kernels that another process compiles come last, so that processes with different orders share the work.
     """
-    elsewhere = []
+    elsewhere, before = [], _method.set(method)
     with garbage_kept():
         for each in kernels:
             if each.is_compiled_elsewhere:
@@ -241,6 +243,7 @@ def prepare_all(kernels: Sequence[Exchangeable]) -> None:
                 each.prepare()
         for each in elsewhere:
             each.prepare()
+    _method.reset(before)
 
 
 def pair_of(first: types.Type, second: types.Type) -> types.Type:
@@ -256,8 +259,9 @@ def pointer_to(signature: Signature) -> types.Type:
 
 
 @functools.cache
-def _begin_compiling() -> None:
-    """Report on stderr why the first run takes long; standard output belongs to results."""
+def _begin_compiling(method: str) -> None:
+    """Report on stderr, once for each method, why its first run takes long; standard output belongs to
+    results."""
     compare_options_as_dictionaries()
-    message = "mbref: compiling kernels for this machine, once for each method; up to a minute"
-    print(message, file=sys.stderr, flush=True)
+    what = f"the kernels of {method}" if method else "kernels"
+    print(f"mbref: compiling {what} for this machine, once; up to a minute", file=sys.stderr, flush=True)

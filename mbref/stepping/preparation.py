@@ -11,7 +11,7 @@ from mbref.stepping.loop import advance_to_end
 
 def prepare(method: Method) -> None:
     """Compile the kernels of the method, or load them from the cache of this machine."""
-    prepare_all(kernels_of(method))
+    prepare_all(kernels_of(method), str(method))
 
 
 def kernels_of(method: Method) -> list[Exchangeable]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 
 from mbref.kernels.compilation import prepare_all
+from mbref.method import SERIES_METHOD
 from mbref.taylor.crossing.steps_across import (
     begin_crossing,
     continue_crossing,
@@ -32,9 +33,9 @@ KERNELS_OF_SERIES = *CALLED[:MIDDLE], *FROM_PYTHON, *CALLED[MIDDLE:]
 @functools.cache
 def prepare_series() -> None:
     """Compile the kernels of the series, or load them from the cache of this machine."""
-    prepare_all(KERNELS_OF_SERIES)
+    prepare_all(KERNELS_OF_SERIES, SERIES_METHOD)
 
 
 def prepare_series_backwards() -> None:
     """Compile or load the kernels of the series, from the last one to the first one."""
-    prepare_all(KERNELS_OF_SERIES[::-1])
+    prepare_all(KERNELS_OF_SERIES[::-1], SERIES_METHOD)
