@@ -109,8 +109,9 @@ def test_a_body_on_one_hinge_or_on_two_coaxial_hinges_is_not_locked():
 # --- slider-cranks in space -------------------------------------------------------------------------------
 
 
-# crank of 0.4 m along x about y; the rod of 1.2, 0.3 and 0.5 m ends on a line along z or x
 def spatial(line: tuple[float, ...], order: str = "crs", reverse: bool = False, way: float = 1.0) -> Scene:
+    """A crank of 0.4 m along x about y, and a rod of 1.2, 0.3 and 0.5 m that ends on ``line``, with bodies in
+    ``order``. ``reverse`` exchanges the bodies of the universal joint, ``way`` turns its second axis."""
     parts = {
         "c": body("crank", 0.1, 0.05, 0.0, orientation=(0.8, 0.6, 0.0, 0.0)),
         "r": body("rod", 0.9, 0.2, 0.3, orientation=(0.8, 0.0, 0.6, 0.0)),
@@ -152,6 +153,8 @@ def test_path_of_a_spatial_slider_crank_closes_its_joints(line, order, reverse, 
 
 @of_cranks
 def test_path_of_a_spatial_slider_crank_begins_at_the_pose_of_the_scene(line, order, reverse, way):
+    """Before the crank turns, positions (m) and rotation matrices are those that the scene states, to
+    CLOSED."""
     given = spatial(line, order, reverse, way)
     pose = spatial_slider_crank(given).poses(np.zeros(1, np.longdouble))
     assert np.abs(pose.position[0] - [b.position for b in given.body]).max() < CLOSED

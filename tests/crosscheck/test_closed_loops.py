@@ -70,7 +70,8 @@ def test_cell_has_the_run_of_least_error_and_the_run_of_the_defaults() -> None:
     assert matrix(found)["mujoco"]["Bennett"].best() is None
 
 
-def test_sentence_on_a_run_states_its_setting_and_error_or_its_failure() -> None:
+def test_sentence_and_command_of_a_run_state_its_setting_and_the_sentence_its_error_or_failure() -> None:
+    """``rerun`` is the command that repeats the run, by the first mechanism's place in the collection."""
     right = measured(1e-9)
     assert "tuned (step 0.001)" in sentence(right) and "1e-09" in sentence(right)
     assert rerun(right).startswith(f"crosscheck run {FIRST.place()} --engine mujoco --setting tuned")
