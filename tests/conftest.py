@@ -6,7 +6,9 @@ import gc
 import os
 import tomllib
 from collections.abc import Iterator
+from contextlib import suppress
 from fnmatch import fnmatchcase
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -23,6 +25,17 @@ HERE = Path(__file__).parent
 SLOW = tomllib.loads((HERE / "slow.toml").read_text())  # file: test: patterns of the slow cases
 OWN_FOLDERS = {".pytest_cache", ".hypothesis", "__pycache__", ".coverage"}  # of the tests' own tools
 MANY = 2000  # tests, among which every kernel is needed
+
+
+def pytest_collection(session: pytest.Session) -> None:
+    """Let the second process that runs all tests import their files from the last one on: each process finds
+    the half that the other one has compiled."""
+    config = session.config
+    if os.environ.get("PYTEST_XDIST_WORKER") != "gw1" or config.args != config.getini("testpaths"):
+        return
+    for path in sorted(HERE.rglob("test_*.py"), reverse=True):
+        with suppress(pytest.skip.Exception):
+            import_module(".".join(path.relative_to(HERE.parent).with_suffix("").parts))
 
 
 def patterns(item: pytest.Item) -> list[str]:

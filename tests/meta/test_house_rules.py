@@ -7,11 +7,11 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from imports import parsed, statements
 
 from mbref.integrators import INTEGRATORS
 from mbref.scenes import SCENES
 from mbref.stabilisation import STABILISATIONS
+from tests.meta.imports import parsed, statements
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("mbref", "crosscheck", "reports")

@@ -3,7 +3,8 @@
 import re
 
 import pytest
-from imports import ROOT, children, circles, floors, graph, imported, sources, upward
+
+from tests.meta.imports import ROOT, children, circles, floors, graph, imported, sources, upward
 
 DOORS = (
     r"command_line|files|formats|printable|terminal|scene(\.(fields|joints|loads|toml|units|validation))?"

@@ -4,9 +4,9 @@ import functools
 import re
 
 import pytest
-from test_words import WORDS
 
 from tests.messages import collected, messages
+from tests.meta.test_words import WORDS
 
 RIDDLES = re.compile(  # turns of which a reader has to find the noun, or the meaning
     r"\b(of no joint|whatever its error\b(?! estimate)|as it comes|left as it is|done without|is told|"

@@ -5,7 +5,8 @@ import statistics
 from pathlib import Path
 
 import pytest
-from imports import sources, statements
+
+from tests.meta.imports import sources, statements
 
 PACKAGES = ("mbref", "crosscheck", "reports")
 MEDIAN, MOST, SHARE = 7, 20, 0.9  # lines of a function's body, and how many have at most MOST

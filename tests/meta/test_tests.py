@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from imports import parsed
+from tests.meta.imports import parsed
 
 ROOT = Path(__file__).parents[2]
 PRODUCT = ("mbref", "crosscheck", "reports")

@@ -4,7 +4,7 @@ import ast
 import tomllib
 from pathlib import Path
 
-from imports import ROOT, sources, statements
+from tests.meta.imports import ROOT, sources, statements
 
 DECORATORS = {"kernel", "inlined", "allocating", "entry", "exchangeable", "intrinsic", "njit", "c_function"}
 

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from imports import parsed, statements
+
+from tests.meta.imports import parsed, statements
 
 ROOT = Path(__file__).parents[2]
 FILES = [

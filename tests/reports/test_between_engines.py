@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn import bars
 
 from crosscheck.engine import Setting
 from crosscheck.judge.gauss_principle import gauss
@@ -14,6 +13,7 @@ from mbref.scenes import SCENES
 from reports.blocks import Block, Moving, Table, Text
 from reports.runs import SceneRuns, by_scene
 from reports.sections import accelerations, crossings, reactions, support
+from tests.reports.drawn import bars
 
 
 def runs_of(name: str) -> SceneRuns:

@@ -7,11 +7,11 @@ import re
 import numpy as np
 import pytest
 from PIL import Image
-from synthetic import groups
 
 from reports import figures, time_series
 from reports.blocks import Figure, Plot
 from reports.sections import blocks, speed
+from tests.reports.synthetic import groups
 
 
 @functools.cache

@@ -5,13 +5,13 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-from synthetic import groups, scene
 
 from reports import render
 from reports.blocks import Matrix, Opening, Plot, Record
 from reports.places import of_family, of_run
 from reports.sections import blocks
 from reports.sections.verdict import render as first_screen
+from tests.reports.synthetic import groups, scene
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,6 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from drawn import SVG, bars
-from synthetic import exact, motion, record, scene, truths
 
 from crosscheck.cli.moving_picture import singular_instants
 from crosscheck.study.truths import FRAMES, TURN, truth_record
@@ -15,6 +13,8 @@ from mbref.scenes import SCENES
 from reports import mechanisms
 from reports.figures import colour
 from reports.runs import Run
+from tests.reports.drawn import SVG, bars
+from tests.reports.synthetic import exact, motion, record, scene, truths
 
 
 def test_exact_run_is_drawn_on_the_exact_motion():

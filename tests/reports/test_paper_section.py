@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from synthetic import MADE_OF
 
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
@@ -21,6 +20,7 @@ from mbref.scene import Scene
 from reports.blocks import Figure, Heading, Table
 from reports.runs import Run
 from reports.sections import paper, paper_cranks, paper_methods, paper_sweep, paper_teaching
+from tests.reports.synthetic import MADE_OF
 
 LETTERS = {outcome.letter: outcome for outcome in Outcome if outcome.letter}
 ILLUSTRATION: dict[str, Any] = {}

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from synthetic import groups
 
 from crosscheck.engine import Setting
 from crosscheck.study.grid import study
@@ -16,6 +15,7 @@ from mbref.scene import Body, Scene
 from reports import render
 from reports.blocks import Block, Heading, Matrix, Table
 from reports.sections import blocks
+from tests.reports.synthetic import groups
 
 FAKE = "tests.helpers.fake_engines:FAKE"
 

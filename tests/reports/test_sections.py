@@ -6,7 +6,6 @@ import re
 from pathlib import Path
 
 import pytest
-from synthetic import groups, nothing, record, records, scene
 
 import mbref
 from crosscheck.conformance.suite import Conformance, Verdict
@@ -29,6 +28,7 @@ from reports.sections import (
     speed,
     summary,
 )
+from tests.reports.synthetic import groups, nothing, record, records, scene
 
 VERIFIED = [Conformance("mujoco", "1.0", [Verdict("truth", "door", "pass")]).to_record()]
 

@@ -7,6 +7,7 @@ import pytest
 
 from crosscheck.cli import main as crosscheck
 from mbref.cli import main
+from tests.helpers.falling_engine import STONE
 
 PROGRAMS = {"mbref": main, "crosscheck": crosscheck}
 PRINTING = [
@@ -61,3 +62,14 @@ def test_errors_print_no_control_character_of_a_scene_file(tmp_path, capsys):
     for name in ("faulty", "key"):
         assert main(["diagnose", str(tmp_path / f"{name}.toml")]) == 2
         assert "\x1b" not in (said := capsys.readouterr().err) and said
+
+
+def test_verdict_prints_no_control_character_of_a_header_that_is_not_read(tmp_path, capsys):
+    """The table has a right column, and one whose name would make the terminal's text red."""
+    STONE.save(tmp_path / "stone.toml")
+    table = tmp_path / "run.csv"
+    rows = "".join(f"{t:.9f},1.000000000,7\n" for t in (0.0, 0.1, 0.2))
+    table.write_text(f"time,stone.position.y,\x1b[31mred\n{rows}")
+    assert crosscheck(["judge", str(tmp_path / "stone.toml"), str(table)]) == 0
+    said = capsys.readouterr()
+    assert "not read: \\x1b[31mred" in said.out and "\x1b" not in said.out + said.err

@@ -14,10 +14,15 @@ from crosscheck.study.command import command
 from mbref.cli import main
 from mbref.files import file_name
 from mbref.scene import Scene, SceneError
+from mbref.scenes import find_scene
 from reports import sections
-from reports.blocks import Card, Figure, Heading, Listing, Record, Table, Text
+from reports.__main__ import main as report
+from reports.blocks import Card, Figure, Heading, Listing, Matrix, Record, Table, Text, Verdict
+from reports.keep import keep
 from reports.render import html, markdown
 from reports.runs import Run, SceneRuns
+from reports.speed_figure import speed_svg
+from reports.stored import groups
 from tests.helpers.falling_engine import STONE
 from tests.helpers.parts import hinge
 from tests.reports import synthetic
@@ -105,6 +110,12 @@ def test_page_and_markdown_of_a_report_show_a_name_without_acting_on_its_markup(
         Table(name, [name], [[name]]),
         Figure("figure", name, lambda: "<svg/>"),
         Record("r-1", name, name, 0, [card], "c-1"),
+        Matrix(
+            name,
+            [("e", name, 0, "")],
+            [(name, name)],
+            {name: {"e": [Verdict(name, name, name, [name], "", "")]}},
+        ),
         Listing(f"```\n{name}"),
     ]
     assert "<img src=x" not in html(blocks, {"figure": "<svg/>"}, name)
@@ -120,16 +131,32 @@ def test_page_and_markdown_of_a_report_show_a_name_without_acting_on_its_markup(
 @pytest.mark.parametrize("name", NAMES)
 def test_printed_commands_of_a_report_name_the_scene_file_as_one_word(name):
     """`shlex.split` reads commands as a shell does: of a run's card, of the report, for another path."""
-    scene = synthetic.scene().with_(name=name)
-    group = SceneRuns(scene, [Run(synthetic.record("mbref", "default", 1e-9, 0.1, a_scene=scene))])
+    group = SceneRuns(synthetic.scene().with_(name=name), [Run({**synthetic.records()[0], "scene": name})])
     blocks = [*sections.records.render([group]), *sections.provenance.render([group])]
     printed = [card.command for block in blocks if isinstance(block, Record) for card in block.cards]
     printed += [line for b in blocks if isinstance(b, Listing) for line in b.text.splitlines()[1:]]
     assert len(printed) == 2
+    ElementTree.fromstring(speed_svg(group, name))  # is XML, whatever the name
     for line in printed:
         assert f"scenes/{file_name(name)}.toml" in shlex.split(line), line
     path = f"a folder/{name}.toml"
     assert path in shlex.split(command(group.runs[0].record, shlex.quote(path)))
+
+
+@pytest.mark.parametrize("name", ["../../other", "a/b", "two words"])
+def test_report_and_its_pack_keep_a_scene_of_any_name_in_their_folder(name, tmp_path, capsys):
+    """The command of the report, in the folder of its page, reads the scene; the packed records have it."""
+    scene, out, packed = tmp_path / "scene.toml", tmp_path / "a" / "b", tmp_path / "c" / "d"
+    STONE.with_(name=name).save(scene)
+    asked = ["--engine", FALLING, "--quick", "--section", "provenance", "--out", str(out)]
+    assert report([str(scene), *asked]) == 0
+    (kept,) = {*tmp_path.rglob("*.toml")} - {scene}
+    assert kept.parent == out / "scenes" and find_scene(kept) == find_scene(scene)
+    words = shlex.split((out / "report.md").read_text().rpartition("crosscheck report")[2].strip("`\n"))
+    assert out / words[0] == kept and words[1:] == ["--out", "."]
+    keep(groups(out), packed)
+    assert [group.scene.name for group in groups(packed)] == [name]
+    assert {path.name for path in tmp_path.iterdir()} == {"scene.toml", "a", "c"}
 
 
 def test_printed_commands_name_a_scene_file_in_any_folder_as_one_word(tmp_path, capsys):

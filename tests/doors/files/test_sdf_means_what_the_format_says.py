@@ -112,6 +112,13 @@ def test_a_moment_of_inertia_larger_than_the_two_others_together_is_refused(file
     assert "link 'plate'" in said and "0.2, 0.3, 0.9" in said and "<ixx>, <iyy>, <izz>" in said
 
 
+def test_a_number_that_no_scene_has_is_refused_with_its_part(files):
+    """A damper with a negative coefficient would drive the joint."""
+    damped = joint("j", "revolute", "world", "plate", inside="<dynamics><damping>-1</damping></dynamics>")
+    said = files.refusal(sdf(link("plate"), damped), "plate.sdf")
+    assert "joint 'j': dynamics" in said and "damping" in said and "-1" in said
+
+
 def test_moments_of_inertia_of_a_flat_plate_are_read(files):
     """One is the sum of the others, 0.3 = 0.1 + 0.2 kg m², except for rounding."""
     scene, _ = files.scene(

@@ -89,7 +89,7 @@ def test_torque_of_a_driver_is_the_reduced_inertia_times_the_acceleration(scene,
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 20))])
 def test_change_of_the_energy_is_the_drivers_work_less_the_dampers_losses(seed: int) -> None:
     """E(t) - E(0) = ∫ (P - Σ c v²) dt. The spline through 401 samples of the power is exact to 1e-8 of the
-    largest energy; the limit has a margin of ten."""
+    largest energy; the limit has a margin of ten. The spring's force is k (l - 0.5 m) + c l'."""
     scene, times = machine(seed), np.linspace(0.0, 1.0, 401)
     table = crosscheck.reference_table(scene, times)
     spring, bar = scene.load
@@ -99,13 +99,6 @@ def test_change_of_the_energy_is_the_drivers_work_less_the_dampers_losses(seed: 
     work = CubicSpline(times, table["driver(A).power"] - lost).antiderivative()(times)
     gained = table["energy"] - table["energy"][0]
     assert np.abs(gained - work).max() <= 1e-7 * np.abs(table["energy"]).max()
-
-
-def test_force_of_a_spring_is_stiffness_times_stretch_plus_damping_times_its_rate() -> None:
-    """F = k (l - 0.5 m) + c l' by the columns of the length l and its rate. All columns are exact to
-    rounding."""
-    scene = machine(0)
-    table, bar = crosscheck.reference_table(scene, np.linspace(0.0, 1.0, 21)), scene.load[1]
     pull = bar.stiffness * (table["load(1).length"] - 0.5) + bar.damping * table["load(1).length_rate"]
     assert table["load(1).force"] == pytest.approx(pull, rel=1e-12)
 

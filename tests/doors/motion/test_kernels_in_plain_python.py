@@ -52,7 +52,7 @@ def states(names: Sequence[str]) -> dict[str, dict[str, list]]:
 
 
 @pytest.mark.parametrize(
-    "names", [NAMES[::3], pytest.param(NAMES, marks=pytest.mark.slow)], ids=["few", "all"]
+    "names", [NAMES[::4], pytest.param(NAMES, marks=pytest.mark.slow)], ids=["few", "all"]
 )
 def test_plain_and_compiled_kernels_agree_to_rounding(names):
     """Outcomes and numbers of steps are equal, and states to 100 roundings in each step and 20 more steps:

@@ -1,12 +1,11 @@
 """Reflected inertia resists acceleration and has no weight, in every method, in batches and in equilibria."""
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numba
 import numpy as np
 import pytest
 
-from mbref import Limits, Scene, ensemble, equilibria, simulate
+from mbref import Limits, Scene, equilibria, simulate
+from mbref.ensembles.simulate_all import simulate_all
 from mbref.formulations import FORMULATIONS
 from mbref.stabilisation import STABILISATIONS
 from tests.helpers import parts
@@ -74,10 +73,8 @@ def test_armature_of_a_slide_has_no_weight_in_generated_code():
 def test_slides_with_armature_of_a_batch_fall_by_their_own_gravity():
     """The displacement is s = ½ m (g·a) / (m + I) t² with each scene's g."""
     scenes = [slide(gravity) for gravity in GRAVITIES for _ in range(2)]
-    with ThreadPoolExecutor(1) as pool:
-        found = dict(ensemble(scenes, TIMES, executor=pool))
-    for place, scene in enumerate(scenes):
-        moved = found[place].position[:, 0] - scene.body[0].position
+    for scene, found in zip(scenes, simulate_all(scenes, "taylor", TIMES, Limits()), strict=True):
+        moved = found.position[:, 0] - scene.body[0].position
         assert off(moved @ scene.joint[0].axis, fallen(scene)) < STEPS
 
 

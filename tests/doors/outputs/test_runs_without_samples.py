@@ -66,7 +66,11 @@ def test_every_array_of_a_motion_without_samples_is_empty(stuck, tmp_path):
     assert [found.shape for found in stuck.determined_reactions.values()] == [(0, 6)] * len(
         stuck.mechanism.joint
     )
-    assert stuck.joint("A").angle.shape == (0,) and len(stuck.to_dataframe()) == 0
+    assert (
+        stuck.reaction_maxima() == {}
+        and stuck.joint("A").angle.shape == (0,)
+        and len(stuck.to_dataframe()) == 0
+    )
 
 
 def test_motion_of_another_engine_without_samples_has_empty_columns_of_all_parts():

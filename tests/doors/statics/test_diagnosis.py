@@ -109,9 +109,10 @@ def test_each_exchange_of_a_hinge_ends_the_redundancy_and_keeps_the_freedom_by_t
         assert mobility(scene.with_(joint=joints))[1:] == (0, 1), exchange
 
 
-def test_rod_between_two_ball_joints_is_named_as_spinning_idly_about_its_axis(tmp_path, capsys):
+@pytest.mark.parametrize("size", [1.0, 1e-3, 1e3])
+def test_rod_between_two_ball_joints_is_named_as_spinning_idly_about_its_axis(size, tmp_path, capsys):
     """The linkage has two freedoms: one of its motion and the spin of the coupler."""
-    shown = printed(ball_linkage(), tmp_path, capsys)
+    shown = printed(in_other_units(ball_linkage(), size, 1.0), tmp_path, capsys)
     assert "degrees of freedom 2" in shown
     assert "coupler can spin about its own axis and moves nothing else" in shown
 
@@ -126,6 +127,25 @@ def test_welded_halves_of_a_rod_between_two_ball_joints_are_named_together(tmp_p
     scene = scene.with_(body=(*scene.body, rod("half", place)), joint=(*joints, weld))
     shown = printed(scene, tmp_path, capsys)
     assert "coupler and half can spin about their own axis and move nothing else" in shown
+
+
+@pytest.mark.parametrize(
+    ("kind", "says"),
+    [("translational", "can slide between its joints"), ("cylindrical", "can move alone in 2 ways")],
+)
+def test_sleeve_between_two_guides_of_one_direction_is_named_with_its_ways_to_move(
+    kind, says, tmp_path, capsys
+):
+    """The guides are on the ground and on a lever that cannot turn: a motion of the sleeve moves no lever."""
+    guide = {"type": kind, "axis": [1.0, 0.0, 0.0]}
+    joints = [
+        {"name": "G", "bodies": ["ground", "sleeve"], "anchor": [0.0, 0.0, 0.0], **guide},
+        {"name": "L", "bodies": ["sleeve", "lever"], "anchor": [0.4, 0.0, 0.0], **guide},
+        hinge("A", ("ground", "lever"), (1.0, 0.0, 0.0)),
+    ]
+    bodies = [rod("sleeve", (0.2, 0.0, 0.0)), rod("lever", (1.0, 0.3, 0.0))]
+    shown = printed(Scene(name="sleeve", body=bodies, joint=joints), tmp_path, capsys)
+    assert f"sleeve {says}" in shown and "moves nothing else" in shown
 
 
 CHAIN = Scene(
