@@ -154,6 +154,7 @@ def circumstance(engine: str, version: str, cpu: str, **more: Any) -> dict[str, 
 
 
 def test_circumstances_name_changed_versions_machines_and_mechanisms():
+    """``circumstance`` has engine, version and machine of a run by its key."""
     old = {
         "1": circumstance("a", "1.0", "x", commit="c1"),
         "2": circumstance("a", "1.1", "x", mechanism="m1"),

@@ -320,6 +320,7 @@ def test_diagnose_lists_passed_singular_positions_instead_of_the_nearest(capsys)
 
 
 def test_command_run_writes_json_and_csv_and_animate_an_svg(tmp_path, capsys, monkeypatch):
+    """Printed lines have at most 80 characters; a file with another ending, run.txt, is refused."""
     run = ["run", "planar_slider_crank", "--duration", "0.01", "--samples", "3"]
     assert main([*run, "--out", str(tmp_path / "run.json")]) == 0
     assert Motion.load(tmp_path / "run.json").times[-1] == 0.01

@@ -205,6 +205,8 @@ def test_motion_on_the_closure_is_mbrefs_and_mujocos(what: str, tmp_path: Path):
 def test_rows_that_do_not_hold_the_loop_are_named(
     change: dict[str, Any], named_so: tuple[str, str], tmp_path: Path
 ):
+    """Rows of the loop's point on the other arm, one row fewer, and a row more; ``named_so`` has name and
+    field of the difference."""
     file = file_of(written(tmp_path, one_equality("connect")))
     match, size = matched(file.machine, file.machine, DOUBLE), size_of(file.machine)
     loops = file.machine.loops or ()
@@ -220,6 +222,7 @@ def test_rows_that_do_not_hold_the_loop_are_named(
 
 
 def test_verdict_names_what_is_dropped_and_whether_the_reader_says_so(tmp_path: Path, capsys: Any):
+    """The reader leaves out mimics with a message, and friction without one; the exit status is 1."""
     case = next(case for case in CASES if (case.form, case.name) == (URDF, "mimic offset"))
     text = case.text.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><dynamics friction="0.2"/>', 1)
     path = written(tmp_path, text, "robot.urdf")

@@ -234,6 +234,8 @@ def test_faults_of_intervals_name_the_field(changes, said):
 
 
 def test_parts_of_a_joint_with_intervals_and_other_commands_are_refused_by_name(tmp_path, capsys):
+    """A driver of such a joint, commands that are of one pose, and a joint that begins to hold against a
+    driver."""
     with pytest.raises(
         SceneError, match=r"driver\[A\].joint: needs a joint that always holds; 'A' has intervals"
     ):

@@ -46,6 +46,7 @@ def test_scene_at_a_time_without_sample_is_refused_with_the_nearest_one(crank):
 
 
 def test_motion_is_a_dictionary_of_its_bodies_and_equal_to_itself_only(crank):
+    """Names of bodies complete in IPython. Motions of bodies and joints are equal to themselves only, too."""
     assert list(crank) == ["crank", "rod", "slider"] and len(crank) == 3
     assert "rod" in crank and "lid" not in crank and 0 not in crank
     assert crank._ipython_key_completions_() == list(crank)
