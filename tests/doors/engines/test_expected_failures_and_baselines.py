@@ -74,7 +74,7 @@ def test_own_limit_replaces_the_limit_of_a_check_on_its_scenes(right, wrong, tmp
 
 def test_failure_no_worse_than_in_the_baseline_does_not_count(right, wrong, tmp_path):
     """The record of the faulty engine excuses it; a value of three times as much, and the record of the right
-    engine do not."""
+    engine do not. A file of another form is refused."""
     for name, found in (("wrong", wrong), ("right", right)):
         (tmp_path / f"{name}.json").write_text(json.dumps(found.to_record()))
     before = OwnLimits(baseline=read_baseline(tmp_path / "wrong.json"))
