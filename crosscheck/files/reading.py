@@ -50,7 +50,7 @@ class Reader:
 class File:
     """A file with its format, its meaning, and what engines are asked.
 
-    ``states`` are those of ``asked`` with the machine's terms; the motion begins at the last one.
+    ``states`` has each state of ``asked`` with the machine's terms; the motion begins at the last one.
     """
 
     path: Path

@@ -410,9 +410,7 @@ def test_json_of_compare_has_the_difference_of_the_engine_whose_bodies_start_els
     assert "initial position: truth and elsewhere" in document["differences"]["elsewhere"], document
 
 
-def test_compare_gives_no_ratios_of_times_if_engines_differ_and_no_truth_is_known(
-    capsys, tmp_path, monkeypatch
-):
+def test_compare_gives_no_ratios_of_times_if_engines_differ_without_a_truth(capsys, tmp_path, monkeypatch):
     """No closed form of two blocks is known, and no reference is requested."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     asked = (*WITH_ELSEWHERE, "--reference-time", "0")

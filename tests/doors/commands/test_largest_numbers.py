@@ -77,9 +77,7 @@ def test_number_outside_its_range_is_refused_with_the_range(command: str, text: 
     ],
 )
 @pytest.mark.parametrize("command", ["run", "compare"])
-def test_sample_time_beyond_the_largest_or_not_increasing_is_refused_by_its_option(
-    command: str, text: str, says, capsys
-):
+def test_sample_time_beyond_the_largest_or_not_increasing_is_refused_by_option(command, text, says, capsys):
     status, said = ended(capsys, command, "four_bar", "--times", f"0,{text}")
     assert status == 2 and f"--times: {says}" in said
 

@@ -68,9 +68,7 @@ def test_file_names_of_different_names_differ_and_are_safe_words_of_a_shell(tmp_
 
 
 @pytest.mark.parametrize("name", ["../../up", "$x_1$ {y}", "<img src=x> & '", "$(touch pwned)", "_hidden"])
-def test_pictures_of_any_name_are_xml_in_the_folder_and_their_legends_show_it(
-    name, tmp_path, monkeypatch, capsys
-):
+def test_pictures_of_any_name_are_xml_in_the_folder_and_legends_show_it(name, tmp_path, monkeypatch, capsys):
     """An XML parser reads each picture. Names in a legend are shown letter by letter: what stands between
     dollar signs is no formula of matplotlib."""
     monkeypatch.chdir(tmp_path)

@@ -153,9 +153,7 @@ def test_mass_matrix_and_gravity_torques_are_mujocos_at_four_poses(tmp_path: Pat
 
 
 @pytest.mark.parametrize("what", ["tree", "connect", "joint"])
-def test_accelerations_and_motion_are_mujocos_and_an_engine_without_dampers_is_named(
-    what: str, tmp_path: Path
-):
+def test_accelerations_and_motion_are_mujocos_and_an_engine_without_dampers_is_named(what, tmp_path):
     """MuJoCo's own terms at random states, with a spring and two dampers, and without these, in a tree,
     with a loop and with a coupling."""
     tree = '<joint name="elbow" type="hinge" axis="0 1 0" damping="0.3" stiffness="5" springref="20"/>'
@@ -202,9 +200,7 @@ def test_motion_on_the_closure_is_mbrefs_and_mujocos(what: str, tmp_path: Path):
         ({"more": True}, ("loops and couplings", "rank of the rows")),
     ],
 )
-def test_rows_that_do_not_hold_the_loop_are_named(
-    change: dict[str, Any], named_so: tuple[str, str], tmp_path: Path
-):
+def test_rows_that_do_not_hold_the_loop_are_named(change, named_so, tmp_path):
     """Rows of the loop's point on the other arm, one row fewer, and a row more; ``named_so`` has name and
     field of the difference."""
     file = file_of(written(tmp_path, one_equality("connect")))

@@ -106,9 +106,7 @@ def test_angles_that_are_not_the_motion_are_off_though_they_have_few_digits(rows
 
 
 @pytest.mark.parametrize(("form", "verdict"), [("%.3f", "right, rounded to 2 digits"), ("%.12g", "right")])
-def test_command_states_the_rounding_of_an_exact_angle_with_three_decimals_alone(
-    form: str, verdict: str, tmp_path: Path, capsys
-) -> None:
+def test_command_states_the_rounding_of_an_angle_with_three_decimals_alone(form, verdict, tmp_path, capsys):
     """Half a unit of three decimals exceeds a thousandth of the range of this angle, less than 0.1 rad."""
     double_pendulum().save(tmp_path / "scene.toml")
     part = {n: exact("double_pendulum")[n][:12] for n in ("time", "A.angle")}

@@ -57,9 +57,7 @@ def test_mass_under_a_periodic_force_moves_as_both_formulations_of_the_reference
 
 @pytest.mark.parametrize("periodic", [True, False])
 @pytest.mark.parametrize("rows", [9, 21, 40])
-def test_stated_error_of_interpolation_is_the_error_within_a_factor_of_three(
-    rows, periodic, tmp_path, capsys
-):
+def test_stated_error_of_interpolation_is_right_to_a_factor_of_three(rows, periodic, tmp_path, capsys):
     """A table of 0.3 sin(2 π t): the largest difference of the second derivatives. A periodic spline is
     better, and the note of a run proposes it."""
     t = np.linspace(0.0, 1.0, rows)
