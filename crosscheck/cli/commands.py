@@ -25,7 +25,7 @@ from crosscheck.cli.running import (
     standard_output_kept,
     studied,
 )
-from crosscheck.cli.stored_tables import closed_loops, convergence, invariants, modes
+from crosscheck.cli.stored_tables import alternatives, closed_loops, convergence, invariants, modes
 from crosscheck.study.grid import Record, key
 from crosscheck.study.progress import counted
 from crosscheck.study.provenance import made_by
@@ -181,6 +181,7 @@ COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "closed-loops": closed_loops,
     "convergence": convergence,
     "invariants": invariants,
+    "alternatives": alternatives,
     "modes": modes,
     "report": _report,
     "paper": _paper,

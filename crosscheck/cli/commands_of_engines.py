@@ -1,9 +1,19 @@
-"""Parsers of the commands for defects and versions of engines: findings, files, diagnose, diff, versions."""
+"""Parsers of the commands for defects and versions of engines: findings, files, alternatives, diagnose, diff,
+versions."""
 
 from __future__ import annotations
 
+from crosscheck.alternatives.records import FILE as ALTERNATIVES
+from crosscheck.alternatives.records import GRAPHS
 from crosscheck.cli.commands_of_motions import Commands, add_command
-from crosscheck.cli.options import MOST_MECHANISMS, add_duration, add_engines, add_limits, add_reading
+from crosscheck.cli.options import (
+    MOST_MECHANISMS,
+    add_duration,
+    add_engines,
+    add_limits,
+    add_reading,
+    add_stored_runs,
+)
 from crosscheck.engines.loaders import PLACES
 from crosscheck.study.grid import MOST_SECONDS
 from mbref.command_line import add_output, number, whole
@@ -18,6 +28,23 @@ def add_findings(commands: Commands) -> None:
     parser.add_argument("name", nargs="*", metavar="NAME", help="a finding; default: all")
     parser.add_argument(
         "--recheck", action="store_true", help="run the proofs, and report which findings are still present"
+    )
+
+
+def add_alternatives(commands: Commands) -> None:
+    """Add the parser of `crosscheck alternatives`."""
+    about = (
+        "show how far the ways of an engine to solve the same equations differ on random mechanisms, from "
+        "stored records; --run makes the missing runs of installed engines"
+    )
+    parser = add_command(commands, "alternatives", about, "crosscheck alternatives --run --engine drake")
+    add_stored_runs(parser, ALTERNATIVES)
+    parser.add_argument(
+        "--mechanisms",
+        type=whole(1, MOST_MECHANISMS),
+        default=GRAPHS,
+        metavar="N",
+        help="number of random mechanisms of --run; default: %(default)s",
     )
 
 

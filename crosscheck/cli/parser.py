@@ -7,6 +7,7 @@ import math
 from textwrap import fill
 
 from crosscheck.cli.commands_of_engines import (
+    add_alternatives,
     add_diagnose,
     add_diff,
     add_files,
@@ -79,6 +80,7 @@ def parser() -> argparse.ArgumentParser:
         _add_closed_loops,
         _add_convergence,
         _add_invariants,
+        add_alternatives,
         _add_modes,
         _add_report,
         _add_paper,

@@ -1,5 +1,5 @@
-"""Commands that measure engines and print stored records: closed loops, convergence, invariants, small
-motions."""
+"""Commands that measure engines and print stored records: closed loops, convergence, invariants,
+alternatives, small motions."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from crosscheck.alternatives import records as agreeing
+from crosscheck.alternatives import table as of_alternatives
 from crosscheck.cli import request
 from crosscheck.cli.rendering import write_page
 from crosscheck.cli.running import COMPLETED, OTHERWISE, console, notice, print_json
@@ -104,6 +106,31 @@ def invariants(arguments: argparse.Namespace) -> int:
         for name, row in found.items():
             table.add_row(name, *(laws.cell(row, column) for column in laws.COLUMNS))
         console().print(table)
+    return COMPLETED
+
+
+def alternatives(arguments: argparse.Namespace) -> int:
+    """Measure engines and write the page if requested, and print a line for each engine and for each pair of
+    ways above its limit."""
+    path = Path(arguments.records)
+    if arguments.run:
+        engines = request.find_engines(arguments.engine or ["all"], notice)
+        agreeing.measure(engines, path, arguments.mechanisms, notice)
+    if status := write_page("alternatives", path, arguments.page):
+        return status
+    found = of_alternatives.engines(agreeing.read(path))
+    table = Table(*of_alternatives.HEADER, title="ways to solve the same equations", box=SIMPLE)
+    for records in found.values():
+        table.add_row(*of_alternatives.line(records))
+    console().print(table)
+    for pair in (pair for records in found.values() for pair in of_alternatives.pairs(records)):
+        if pair.cause:
+            said = (
+                f"{pair.engine}: {' – '.join(pair.ways)}: {pair.found[0].size:.0e} on {pair.found[0].scene}"
+            )
+            console().print(
+                f"{said}, above {pair.within:.0e} on {pair.above}: {pair.cause.because}", soft_wrap=True
+            )
     return COMPLETED
 
 

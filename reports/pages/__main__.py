@@ -16,7 +16,7 @@ from mbref.files import write
 from ..markdown import body
 
 NAMES = (
-    *("which-engine", "closed-loops", "convergence", "invariants", "small-motions", "files"),
+    *("which-engine", "closed-loops", "convergence", "invariants", "alternatives", "small-motions", "files"),
     *("findings", "support"),
 )
 TEMPLATES = Path(__file__).parents[1] / "templates"  # texts of the pages, with names of parts in braces

@@ -242,13 +242,15 @@ class Simulation:
         for twist, change, body in zip(twists, changes, links, strict=True):
             mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, body, twist, 0)
             mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_XBODY, body, change, 0)
+        # MuJoCo counts gravity as an upward acceleration of the world; up to 3.17 not of a body fixed to it
+        acceleration = changes[:, 3:] + model.opt.gravity
+        acceleration[model.body_weldid[links] == 0] = 0.0
         return LinkMotion(
             rotation=data.xmat[links].reshape(-1, 3, 3),
             position=data.xpos[links],
             velocity=twists[:, 3:],
             angular_velocity=twists[:, :3],
-            # MuJoCo counts gravity as an upward acceleration of the world
-            acceleration=changes[:, 3:] + model.opt.gravity,
+            acceleration=acceleration,
             angular_acceleration=changes[:, :3],
             coordinates=self._coordinates(),
             rates=data.qvel.copy(),

@@ -50,6 +50,7 @@ COMMANDS = {
         ("closed-loops",),
         ("convergence",),
         ("invariants",),
+        ("alternatives",),
         ("modes",),
         ("reference", "four_bar_gravity", *SHORT, "--out", "reference.csv"),
         ("judge", "four_bar_gravity", "motion.csv"),
