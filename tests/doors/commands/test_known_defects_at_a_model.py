@@ -2,15 +2,20 @@
 
 import json
 from collections.abc import Mapping
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+import crosscheck.findings
 from crosscheck.cli.commands import main
-from crosscheck.engine import Setting, engine
+from crosscheck.conformance.mechanisms.invariant import moved_away
+from crosscheck.engine import Setting, engine, installed
 from crosscheck.findings.at_model import defects
-from crosscheck.findings.finding import Finding, When
+from crosscheck.findings.finding import Finding, When, findings
+from crosscheck.invariants.experiments import four_bar
+from mbref.scene import Scene
 from tests.helpers.falling_engine import STONE
 
 CHAINS = Path(__file__).parents[3] / "examples" / "four_chains.xml"
@@ -51,11 +56,42 @@ def test_no_defect_is_reported_without_an_improvement_or_where_its_conditions_ar
     assert said(options, remedy, **conditions) == []
 
 
+WITH = {one.name: one for one in findings() if one.when}
+
+
+def turned(name: str) -> Scene:
+    """Return a four-bar of the findings, turned in space or not."""
+    return Scene.from_file(resources.files(crosscheck.findings) / f"{name}.toml")
+
+
+# a mechanism that meets the conditions of a finding and has it, and one that meets them without having it
+MODELS: dict[str, tuple[Scene | Path, Scene]] = {
+    "dart-hinge-closure-turned": (turned("hinged_four_bar_turned"), turned("ball_four_bar")),
+    "mujoco-sparse-jacobian-of-loops": (CHAINS, four_bar()),
+    "pinocchio-lcaba-distance": (moved_away(four_bar(), 1000.0), four_bar()),
+}
+
+
+def test_each_finding_with_conditions_has_a_mechanism_in_these_tests():
+    """Mechanisms are listed by finding."""
+    assert WITH.keys() == MODELS.keys()
+
+
 @pytest.mark.slow
-def test_sparse_jacobian_of_mujoco_4_0_0_is_named_at_a_file_with_several_loops(capsys):
-    """MuJoCo 4.0.0 factorises the sparse matrix of this file wrongly: one defect, exit status 1. Other
-    versions have no defect there, and status 0."""
-    status = main(["diagnose", str(CHAINS), "--engine", "mujoco", "--json"])
-    (found,) = json.loads(capsys.readouterr().out)["engines"]
-    is_wrong = engine("mujoco").version() == "4.0.0"
-    assert status == is_wrong and len(found["defects"]) == is_wrong
+@pytest.mark.parametrize("name", MODELS)
+def test_finding_is_named_at_a_mechanism_that_has_it_and_not_at_another_one(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    """The finding belongs to the installed version if its conditions name that version, or none."""
+    asked, when = WITH[name].engine, WITH[name].when
+    if not installed(asked):
+        pytest.skip(f"{asked} is not installed")
+    applies = not when.versions or engine(asked).version() in when.versions
+    for model, expected in zip(MODELS[name], ([name] * applies, []), strict=True):
+        path = model if isinstance(model, Path) else tmp_path / "scene.toml"
+        if isinstance(model, Scene):
+            model.save(path)
+        status = main(["diagnose", str(path), "--engine", asked, "--json"])
+        (found,) = json.loads(capsys.readouterr().out)["engines"]
+        assert [one["finding"] for one in found["defects"]] == expected, found
+        assert status == len(expected)
