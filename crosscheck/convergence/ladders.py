@@ -63,7 +63,7 @@ ROWS = (
     Row("mbref", "mpi-svd+partitioning", "DOP853 (order 8), tolerance"),
     Row("mujoco", "tuned", "MuJoCo's RK4, regulariser negligible"),
     Row("mujoco", "stock", "MuJoCo's RK4, stiffest documented closures"),
-    Row("mujoco", "euler", "MuJoCo's semi-implicit Euler, default closures"),
+    Row("mujoco", "euler", "MuJoCo's semi-implicit Euler, stiffest documented closures"),
     Row("mujoco", "discrete", "MuJoCo's integrator discrete, stiffest documented closures"),
     Row("pinocchio", "baumgarte", "RK4 with Pinocchio's Baumgarte terms"),
     Row("pinocchio", "lcaba", "RK4 with the loop-constrained articulated body algorithm"),

@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from mbref.motions.motion import Motion
 
+FRAME = 3  # characters of a cell beside its text: two blanks and a line
 PIPED_WIDTH = 80  # characters of a line without a terminal
 HOUR = 3600.0  # s
 PAUSE = 10.0  # s between two progress lines if stderr is no terminal
@@ -75,17 +76,54 @@ def body_table(
     return table
 
 
-def column_table(columns: Mapping[str, np.ndarray], units: Sequence[str] = ()) -> Table:
-    """Return a table with a column of numbers over time for each of the named columns (k,), time first."""
-    from rich.table import Table
+class _Numbers(NamedTuple):
+    """A column of a table: the lines of its title, and its numbers as they are printed."""
 
-    table, shown = Table(), []
+    title: str
+    numbers: Sequence[str]
+
+    @property
+    def width(self) -> int:
+        """Characters of the column with its frame, where no line is broken."""
+        return FRAME + max(map(len, (*self.title.split("\n"), *self.numbers)))
+
+
+def column_tables(
+    columns: Mapping[str, np.ndarray], units: Sequence[str] = (), width: int = PIPED_WIDTH
+) -> Iterator[Table]:
+    """Yield tables of numbers over time that fit into ``width`` characters, with no number broken.
+
+    Each of the named columns (k,) is in one table; the time, the first of them, is in all.
+    """
+    shown = []
     for name, values in columns.items():
         unit, size = unit_of_column(name, units)
-        table.add_column(f"{name}\n{unit}", justify="right", overflow="fold")
-        shown.append(values if name.endswith(SMALL_COLUMNS) else rounded(values) / size)
-    for row in zip(*shown, strict=True):
-        table.add_row(*(f"{x:.6g}" for x in row))
+        numbers = values if name.endswith(SMALL_COLUMNS) else rounded(values) / size
+        shown.append(_Numbers(f"{name}\n{unit}", [f"{x:.6g}" for x in numbers]))
+    if _width(shown) > width:
+        shown = [column._replace(title=column.title.replace(".", "\n.")) for column in shown]
+    part = shown[:1]
+    for column in shown[1:]:
+        if len(part) > 1 and _width([*part, column]) > width:
+            yield _table_of(part)
+            part = shown[:1]
+        part = [*part, column]
+    yield _table_of(part)
+
+
+def _width(columns: Iterable[_Numbers]) -> int:
+    return 1 + sum(column.width for column in columns)
+
+
+def _table_of(columns: Sequence[_Numbers]) -> Table:
+    from rich.table import Table
+
+    table = Table()
+    for title, numbers in columns:
+        least = max(map(len, numbers), default=0)  # a title is broken if the table is too wide all the same
+        table.add_column(title, justify="right", overflow="fold", min_width=least)
+    for row in zip(*(column.numbers for column in columns), strict=True):
+        table.add_row(*row)
     return table
 
 

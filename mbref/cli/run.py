@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbref.cli.output import body_table, column_table, console, progress_bar, rounded
+from mbref.cli.output import body_table, column_tables, console, progress_bar, rounded
 from mbref.cli.request import add_method_options, add_scene, add_units, request_of
 from mbref.command_line import add_output
 from mbref.input_error import InputError
@@ -173,7 +173,8 @@ def show(
     if with_maxima:
         out.print(_maxima_table(trajectory, units))
     if columns:
-        out.print(column_table(trajectory.columns(*columns), units))
+        for table in column_tables(trajectory.columns(*columns), units, out.width):
+            out.print(table)
         for sentence in _undetermined(trajectory, columns):
             out.print(sentence)
         return

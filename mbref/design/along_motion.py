@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from mbref.design.start import diagnosed_start
 from mbref.equations.branches import MOST_BRANCHED_ROWS as MOST_BRANCHED
 from mbref.equations.branches import second_order
 from mbref.equations.counts import RANK_TOLERANCE, scaled_jacobian
 from mbref.equations.gaps import is_closed
-from mbref.equations.initial_state import consistent_start, solve_positions
+from mbref.equations.initial_state import solve_positions
 from mbref.equations.model import Model, displaced, poses
 from mbref.equations.offsets import assembled
 from mbref.linear_algebra.least_norm import null_space
@@ -148,7 +149,7 @@ def _summary(model: Model, motion: Motion, values: np.ndarray) -> AlongMotion:
 
 def general_pose(model: Model, seed: int = 1) -> np.ndarray:
     """Return coordinates (7 nb,) of a random pose near the start that satisfies the joints."""
-    q, random = consistent_start(model).q, np.random.default_rng(seed)
+    q, random = diagnosed_start(model).q, np.random.default_rng(seed)
     if model.m > MOST_ROWS_ALONG:
         return q
     for _ in range(5):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mbref.design.start import diagnosed_start
 from mbref.equations.counts import (
     RANK_TOLERANCE,
     Counts,
@@ -16,7 +17,7 @@ from mbref.equations.counts import (
     redundancy_of,
     scaled_jacobian,
 )
-from mbref.equations.initial_state import LARGE, Start, consistent_start
+from mbref.equations.initial_state import LARGE, Start
 from mbref.equations.joint_reactions import determined_components
 from mbref.equations.model import Model
 from mbref.equations.offsets import assembled
@@ -82,7 +83,7 @@ def diagnose(scene: Scene | str | Path) -> Diagnosis:
         If the scene is faulty, or its initial positions contradict the joints.
     """
     model = Model(assembled(find_scene(scene)))
-    start = consistent_start(model)
+    start = diagnosed_start(model)
     if model.m > LARGE:
         found = redundancy_of(model, start)
         rank, shared = found.rank, found.shares > UNIQUE_SHARE

@@ -9,8 +9,8 @@ import numpy as np
 
 from mbref import rotations
 from mbref.design.along_motion import general_pose
+from mbref.design.start import diagnosed_start
 from mbref.equations.counts import scaled_jacobian
-from mbref.equations.initial_state import consistent_start
 from mbref.equations.model import Model
 from mbref.equations.offsets import assembled
 from mbref.linear_algebra.least_norm import null_space
@@ -44,7 +44,7 @@ def idle_freedoms(scene: Scene | str | Path) -> list[str]:
     model = Model(without_armatures(assembled(scene)))
     if not 0 < model.m <= MOST_LINKED_ROWS:
         return []
-    q, general = consistent_start(model).q, general_pose(model)
+    q, general = diagnosed_start(model).q, general_pose(model)
     found = [
         _sentence(model, q, link, joints)
         for link, joints in _links(scene)

@@ -231,3 +231,17 @@ def test_picture_that_needs_a_missing_library_is_refused_with_the_extra_to_insta
     command = "plot" if ending == "png" else "animate"
     assert main([command, str(path), "--samples", "3", "--out", str(tmp_path / f"my.{ending}")]) == 2
     assert "pip install 'mbref[" in capsys.readouterr().err
+
+
+def test_tables_of_many_columns_fit_80_characters_and_break_no_number(capsys):
+    """21 numbers of the coupler and the energy, over three times; each table begins with the time."""
+    columns = ("coupler", "energy")
+    words = ("--duration", "0.02", "--samples", "3", "--columns", *columns)
+    assert main(["run", "four_bar_gravity", *words]) == 0
+    shown = capsys.readouterr().out
+    assert max(map(len, shown.splitlines())) <= 80
+    cells = [line.strip("│").split("│") for line in shown.splitlines() if line.startswith("│")]
+    assert {row[0].strip() for row in cells} == {"0", "0.01", "0.02"}
+    motion = simulate("four_bar_gravity", times=[0.0, 0.01, 0.02]).columns(*columns)
+    expected = [f"{x:.6g}" for name, of in motion.items() if name != "time" for x in np.round(of, 12) + 0.0]
+    assert sorted(cell.strip() for row in cells for cell in row[1:]) == sorted(expected)

@@ -23,7 +23,7 @@ def twice_driven(first, second) -> Scene:
     return Scene(name="twice", body=[rod("block", (0.0, 0.0, 0.0))], joint=joints, driver=drivers)
 
 
-@pytest.mark.parametrize("share", [1e-3, 1e-8])
+@pytest.mark.parametrize("share", [0.5, 1e-3, 1e-8])
 @pytest.mark.parametrize("power", [1, 2, 4])
 def test_commands_name_two_drivers_of_one_slide_whose_motions_differ(power, share, tmp_path, capsys):
     """One driver moves the slide by 3 t m, the other by 3 t + 3 share tⁿ m, n = 1, 2 or 4: velocities or
