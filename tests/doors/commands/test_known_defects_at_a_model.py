@@ -10,7 +10,6 @@ import pytest
 
 import crosscheck.findings
 from crosscheck.cli.commands import main
-from crosscheck.conformance.mechanisms.invariant import moved_away
 from crosscheck.engine import Setting, engine, installed
 from crosscheck.findings.at_model import defects
 from crosscheck.findings.finding import Finding, When, findings
@@ -64,11 +63,32 @@ def turned(name: str) -> Scene:
     return Scene.from_file(resources.files(crosscheck.findings) / f"{name}.toml")
 
 
+def three_links() -> Scene:
+    """Return a loop of a crank and two links on ball joints, which falls from rest."""
+    places = ((0.4, 0.1, 0.2), (1.4, 0.1, 0.2), (1.4, 0.6, 0.7))
+    links = [
+        {"name": f"link{k}", "mass": 1.0, "inertia": [0.05, 0.06, 0.07], "position": place}
+        for k, place in enumerate(places)
+    ]
+    crank = {"name": "A", "type": "revolute", "bodies": ("ground", "link0")}
+    balls = (
+        ("link0", "link1", (1.0, 0.0, 0.0)),
+        ("link1", "link2", (1.0, 0.5, 0.5)),
+        ("link2", "ground", (1.5, 0.7, 0.8)),
+    )
+    joints = [
+        {"name": f"{a}-{b}", "type": "spherical", "bodies": (a, b), "anchor": anchor}
+        for a, b, anchor in balls
+    ]
+    axis = {"anchor": (0.0, 0.0, 0.0), "axis": (0.0, 0.0, 1.0)}
+    return Scene(name="links", gravity=(0.0, 0.0, -9.81), body=links, joint=[crank | axis, *joints])
+
+
 # a mechanism that meets the conditions of a finding and has it, and one that meets them without having it
 MODELS: dict[str, tuple[Scene | Path, Scene]] = {
     "dart-hinge-closure-turned": (turned("hinged_four_bar_turned"), turned("ball_four_bar")),
     "mujoco-sparse-jacobian-of-loops": (CHAINS, four_bar()),
-    "pinocchio-lcaba-distance": (moved_away(four_bar(), 1000.0), four_bar()),
+    "pinocchio-lcaba-typical-mu": (three_links(), four_bar()),
 }
 
 
