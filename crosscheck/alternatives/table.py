@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from statistics import median
@@ -50,9 +50,9 @@ class Pair(NamedTuple):
         return median(each.size for each in self.found)
 
     @property
-    def above(self) -> int:
-        """Return the number of mechanisms on which the difference exceeds the limit."""
-        return sum(each.size > self.within for each in self.found)
+    def above(self) -> list[Difference]:
+        """Return the differences above the limit."""
+        return [each for each in self.found if each.size > self.within]
 
     @property
     def cause(self) -> Cause | None:
@@ -63,7 +63,14 @@ class Pair(NamedTuple):
         if not self.above:
             return None
         listed = (each for each in causes() if each.engine == self.engine and each.way in self.ways)
-        return next(listed, Cause(self.engine, "", UNKNOWN))
+        return next(listed, Cause(self.engine, " – ".join(self.ways), UNKNOWN))
+
+
+class Above(NamedTuple):
+    """A cause, and the pairs of ways that differ by it above their limit."""
+
+    cause: Cause
+    pairs: Sequence[Pair]
 
 
 @cache
@@ -98,6 +105,16 @@ def pairs(records: Sequence[Record]) -> list[Pair]:
         Pair(engine, (first, second), within, sorted(differences, reverse=True))
         for (within, first, second), differences in found.items()
     ]
+
+
+def above(found: Mapping[str, Sequence[Record]]) -> list[Above]:
+    """Return the causes of differences above a limit, from the records of each engine."""
+    by_cause: dict[Cause, list[Pair]] = {}
+    for own in found.values():
+        for pair in pairs(own):
+            if pair.cause:
+                by_cause.setdefault(pair.cause, []).append(pair)
+    return [Above(cause, of_cause) for cause, of_cause in by_cause.items()]
 
 
 def off(records: Sequence[Record]) -> dict[str, list[float]]:
@@ -137,5 +154,5 @@ def line(records: Sequence[Record]) -> tuple[str, ...]:
         str(sum(bool(record["refused"]) for record in records)),
         str(len(found)),
         f"{worst.found[0].size:.0e}: {' – '.join(worst.ways)}" if worst else "",
-        f"{sum(pair.above > 0 for pair in found)} pairs",
+        f"{sum(bool(pair.above) for pair in found)} pairs",
     )

@@ -218,6 +218,8 @@ def _add_convergence(commands: Commands) -> None:
     )
     parser = add_command(commands, "convergence", about, "crosscheck convergence --run --engine drake")
     add_stored_runs(parser, LADDERS)
+    about = "families of MuJoCo and Pinocchio on every built-in scene, from records of their own"
+    parser.add_argument("--every-scene", action="store_true", help=about)
 
 
 def _add_invariants(commands: Commands) -> None:

@@ -21,7 +21,7 @@ from crosscheck.cli.running import COMPLETED, OTHERWISE, console, notice, print_
 from crosscheck.cli.scene_request import find_scenes
 from crosscheck.closed_loops import records as closed
 from crosscheck.closed_loops.matrix import LEGEND, Cell, is_run, matrix, shown
-from crosscheck.convergence import ladders, orders
+from crosscheck.convergence import every_scene, ladders, orders
 from crosscheck.engine import all_engines
 from crosscheck.invariants import laws
 from crosscheck.invariants import records as kept
@@ -79,10 +79,14 @@ def convergence(arguments: argparse.Namespace) -> int:
     """Measure engines and write the page if requested, and print the table of errors and orders."""
     path = Path(arguments.records)
     if arguments.run:
-        ladders.measure(request.find_engines(arguments.engine or ["all"], notice), path, notice)
+        engines = request.find_engines(arguments.engine or ["all"], notice)
+        if arguments.every_scene:
+            ladders.measure(engines, every_scene.FILE, notice, every_scene.ROWS, every_scene.mechanisms())
+        else:
+            ladders.measure(engines, path, notice)
     if status := write_page("convergence", path, arguments.page):
         return status
-    console().print(_orders(read_runs(path)))
+    console().print(_of_scenes() if arguments.every_scene else _orders(read_runs(path)))
     return COMPLETED
 
 
@@ -91,6 +95,15 @@ def _orders(runs: Sequence[Record]) -> Table:
     table = Table("engine, family", *headings, title="least errors, and orders in parentheses", box=SIMPLE)
     for row, found in orders.table(runs).items():
         table.add_row(row.name, *map(orders.cell, found.values()))
+    return table
+
+
+def _of_scenes() -> Table:
+    found = every_scene.table(read_runs(every_scene.FILE))
+    headings = [row.name for row in every_scene.ROWS]
+    table = Table("scene", *headings, title="least errors, orders, CPU time", box=SIMPLE)
+    for name, rows in found.items():
+        table.add_row(name, *map(every_scene.cell, rows.values()))
     return table
 
 
@@ -110,8 +123,8 @@ def invariants(arguments: argparse.Namespace) -> int:
 
 
 def alternatives(arguments: argparse.Namespace) -> int:
-    """Measure engines and write the page if requested, and print a line for each engine and for each pair of
-    ways above its limit."""
+    """Measure engines and write the page if requested, and print a line for each engine and for each
+    cause of differences above a limit."""
     path = Path(arguments.records)
     if arguments.run:
         engines = request.find_engines(arguments.engine or ["all"], notice)
@@ -123,14 +136,10 @@ def alternatives(arguments: argparse.Namespace) -> int:
     for records in found.values():
         table.add_row(*of_alternatives.line(records))
     console().print(table)
-    for pair in (pair for records in found.values() for pair in of_alternatives.pairs(records)):
-        if pair.cause:
-            said = (
-                f"{pair.engine}: {' – '.join(pair.ways)}: {pair.found[0].size:.0e} on {pair.found[0].scene}"
-            )
-            console().print(
-                f"{said}, above {pair.within:.0e} on {pair.above}: {pair.cause.because}", soft_wrap=True
-            )
+    for cause, pairs in of_alternatives.above(found):
+        worst = max(pair.found[0] for pair in pairs)
+        said = f"{cause.engine}, {cause.way}: up to {worst.size:.0e} on {worst.scene}: {cause.because}"
+        console().print(said, soft_wrap=True)
     return COMPLETED
 
 

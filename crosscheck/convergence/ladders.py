@@ -166,7 +166,13 @@ def point(record: Record) -> str:
     return f"{fineness(record):.2g}: {result}"
 
 
-def measure(engines: Sequence[str], path: Path = FILE, report: Callable[[str], None] = print) -> None:
+def measure(
+    engines: Sequence[str],
+    path: Path = FILE,
+    report: Callable[[str], None] = print,
+    rows: Sequence[Row] = ROWS,
+    mechanisms: Sequence[Difficulty] = MECHANISMS,
+) -> None:
     """Make the runs that the file lacks, one at a time, and store them after each row on a mechanism;
     ``report`` gets a line for each run."""
     known = {record["key"]: record for record in read_runs(path)}
@@ -179,8 +185,8 @@ def measure(engines: Sequence[str], path: Path = FILE, report: Callable[[str], N
                 report(f"{made['engine']} {made['family']} {made['scene']}: {point(made)}")
             return known[key(case)]
 
-        for row in (row for row in ROWS if row.engine in engines):
-            for mechanism in MECHANISMS:
+        for row in (row for row in rows if row.engine in engines):
+            for mechanism in mechanisms:
                 if not climb(ladder(row, mechanism), run, row.time_limit):
                     refused = _refusal(row, mechanism)
                     known[refused["key"]] = refused

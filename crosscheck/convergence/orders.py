@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from crosscheck.closed_loops.mechanisms import Difficulty
 from crosscheck.convergence.ladders import MECHANISMS, ROWS, VAIN, Row, fineness, in_vain, point
 from crosscheck.judge.metrics import order_of_convergence
 from crosscheck.study.grid import Record
@@ -15,17 +16,22 @@ NEAR = 3.0  # errors up to this multiple of a floor are partly the floor
 Table = Mapping[Row, Mapping[str, Sequence[Record]]]
 
 
-def table(records: Sequence[Record]) -> Table:
+def table(
+    records: Sequence[Record], rows: Sequence[Row] = ROWS, mechanisms: Sequence[Difficulty] = MECHANISMS
+) -> Table:
     """Return the records of each measured row by heading of the mechanism, coarse to fine."""
     measured = {(r["engine"], r["family"]) for r in records}
-    return {row: _by_mechanism(row, records) for row in ROWS if (row.engine, row.family) in measured}
+    asked = [row for row in rows if (row.engine, row.family) in measured]
+    return {row: _by_mechanism(row, records, mechanisms) for row in asked}
 
 
-def _by_mechanism(row: Row, records: Sequence[Record]) -> Mapping[str, Sequence[Record]]:
+def _by_mechanism(
+    row: Row, records: Sequence[Record], mechanisms: Sequence[Difficulty]
+) -> Mapping[str, Sequence[Record]]:
     own = [r for r in records if (r["engine"], r["family"]) == (row.engine, row.family)]
     return {
         m.heading: sorted((r for r in own if r["scene"] == m.scene), key=fineness, reverse=True)
-        for m in MECHANISMS
+        for m in mechanisms
     }
 
 

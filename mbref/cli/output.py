@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from mbref.motions.motion import Motion
 
-FRAME = 3  # characters of a cell beside its text: two blanks and a line
+CELL_FRAME = 3  # characters of a cell beside its text: two blanks and a line
 PIPED_WIDTH = 80  # characters of a line without a terminal
 HOUR = 3600.0  # s
 PAUSE = 10.0  # s between two progress lines if stderr is no terminal
@@ -85,7 +85,7 @@ class _Numbers(NamedTuple):
     @property
     def width(self) -> int:
         """Characters of the column with its frame, where no line is broken."""
-        return FRAME + max(map(len, (*self.title.split("\n"), *self.numbers)))
+        return CELL_FRAME + max(map(len, (*self.title.split("\n"), *self.numbers)))
 
 
 def column_tables(

@@ -8,23 +8,18 @@ from pathlib import Path
 from crosscheck.alternatives import table
 from crosscheck.alternatives.records import EVERY, FILE, GRAPHS, TIME_LIMIT, Record, read
 
-from ..blocks import Fold, Parts, Table, Within
+from ..blocks import Fold, Marked, Parts, Table, Within
 
+ABOVE = ("engine", "way", "pairs", "mechanisms", "worst", "in", "of", "limit", "cause")
 PAIRS = ("pair of ways", "mechanisms", "median", "worst", "in", "of", "limit", "above")
 
 
 def parts(records: Path = FILE) -> Parts:
     """Return the parts of the page from the records in a file."""
     found = table.engines(read(records))
-    rows = [
-        (pair.engine, *_pair(pair), _cause(pair.cause))
-        for own in found.values()
-        for pair in table.pairs(own)
-        if pair.cause
-    ]
     return {
         "summary": [Table("Ways of engines on random mechanisms.", table.HEADER, _summary(found))],
-        "above": [Table("Pairs above their limit.", ("engine", *PAIRS, "cause"), rows)],
+        "above": [Table("Ways that differ, and why.", ABOVE, [_above(row) for row in table.above(found)])],
         "engines": [_engine(name, own) for name, own in found.items()],
         "graphs": str(GRAPHS),
         "every": str(EVERY),
@@ -44,15 +39,25 @@ def _pair(pair: table.Pair) -> tuple[str, ...]:
         f"{pair.median:.0e}",
         f"{worst.size:.0e}",
         worst.quantity,
-        f"{worst.body} of `{worst.scene}`",
+        f"`{worst.body}` of `{worst.scene}`",
         f"{pair.within:.0e}",
-        str(pair.above),
+        str(len(pair.above)),
     )
 
 
-def _cause(cause: table.Cause | None) -> str:
-    assert cause
-    return cause.because + f" ([{cause.finding}](findings.md#{cause.finding}))" * bool(cause.finding)
+def _above(row: table.Above) -> tuple[str, ...]:
+    worst, cause = max(pair.found[0] for pair in row.pairs), row.cause
+    return (
+        cause.engine,
+        cause.way,
+        str(len(row.pairs)),
+        str(len({each.scene for pair in row.pairs for each in pair.above})),
+        f"{worst.size:.0e}",
+        worst.quantity,
+        f"`{worst.body}` of `{worst.scene}`",
+        f"{row.pairs[0].within:.0e}",
+        Marked(cause.because + f" ([finding](findings.md#{cause.finding}))" * bool(cause.finding)),
+    )
 
 
 def _engine(name: str, own: Sequence[Record]) -> Fold:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from crosscheck.convergence import every_scene
 from crosscheck.convergence.ladders import FILE, MECHANISMS, SLOW, TIME_LIMIT, Row
 from crosscheck.convergence.orders import NEAR, cell, listed, table
 from crosscheck.study.grid import Record
@@ -24,10 +25,20 @@ def parts(records: Path = FILE) -> Parts:
         "table": [Table("Least errors, and orders in parentheses.", header, rows)],
         "mechanisms": listing(columns),
         "runs": [_runs(row, versions[row.engine], of_row) for row, of_row in found.items()],
+        "every_scene": [_of_scenes()],
+        "longest": f"{every_scene.LONGEST:g}",
+        "short": f"{every_scene.TIME_LIMIT:g}",
         "time_limit": f"{TIME_LIMIT:g}",
         "slow": f"{SLOW:g}",
         "near": f"{NEAR:g}",
     }
+
+
+def _of_scenes() -> Table:
+    found = every_scene.table(read_runs(every_scene.FILE))
+    header = ("scene", *(row.name for row in every_scene.ROWS))
+    rows = [(f"`{name}`", *map(every_scene.cell, of.values())) for name, of in found.items()]
+    return Table("Least errors, orders in parentheses, and CPU time.", header, rows)
 
 
 def _runs(row: Row, version: str, runs: Mapping[str, Sequence[Record]]) -> Fold:

@@ -6,6 +6,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import crosscheck.findings
@@ -63,6 +64,21 @@ def turned(name: str) -> Scene:
     return Scene.from_file(resources.files(crosscheck.findings) / f"{name}.toml")
 
 
+def welded() -> Scene:
+    """Return an arm with a tip, which two hinges on one axis and a ball beside it hold."""
+    arm = {"name": "arm", "mass": 1.0, "inertia": [0.05, 0.06, 0.07], "position": (0.3, 0.1, 0.2)}
+    tip = arm | {"name": "tip", "position": (0.8, 0.3, 0.1)}
+    place, axis = np.array([0.5, 0.0, 0.0]), np.array([0.6, 0.48, 0.64])
+    ends = ("ground", "arm"), ("arm", "tip"), ("arm", "tip")
+    lines = (np.zeros(3), [0.0, 0.0, 1.0]), (place, axis), (place + 0.3 * axis, axis)
+    hinges = [
+        {"name": f"hinge{k}", "type": "revolute", "bodies": pair, "anchor": list(at), "axis": list(along)}
+        for k, (pair, (at, along)) in enumerate(zip(ends, lines, strict=True))
+    ]
+    ball = {"name": "ball", "type": "spherical", "bodies": ("arm", "tip"), "anchor": (0.7, 0.3, 0.1)}
+    return Scene(name="welded", gravity=(0.0, -9.81, 0.0), body=[arm, tip], joint=[*hinges, ball])
+
+
 def three_links() -> Scene:
     """Return a loop of a crank and two links on ball joints, which falls from rest."""
     places = ((0.4, 0.1, 0.2), (1.4, 0.1, 0.2), (1.4, 0.6, 0.7))
@@ -89,6 +105,7 @@ MODELS: dict[str, tuple[Scene | Path, Scene]] = {
     "dart-hinge-closure-turned": (turned("hinged_four_bar_turned"), turned("ball_four_bar")),
     "mujoco-sparse-jacobian-of-loops": (CHAINS, four_bar()),
     "pinocchio-lcaba-typical-mu": (three_links(), four_bar()),
+    "pinocchio-pgs-converged-too-early": (welded(), three_links()),
 }
 
 
@@ -107,11 +124,11 @@ def test_finding_is_named_at_a_mechanism_that_has_it_and_not_at_another_one(
     if not installed(asked):
         pytest.skip(f"{asked} is not installed")
     applies = not when.versions or engine(asked).version() in when.versions
-    for model, expected in zip(MODELS[name], ([name] * applies, []), strict=True):
+    for model, has_it in zip(MODELS[name], (applies, False), strict=True):
         path = model if isinstance(model, Path) else tmp_path / "scene.toml"
         if isinstance(model, Scene):
             model.save(path)
         status = main(["diagnose", str(path), "--engine", asked, "--json"])
         (found,) = json.loads(capsys.readouterr().out)["engines"]
-        assert [one["finding"] for one in found["defects"]] == expected, found
-        assert status == len(expected)
+        named = [one["finding"] for one in found["defects"]]
+        assert (name in named) == has_it and status == bool(named), found
