@@ -28,7 +28,7 @@ MISPRINTS = (
     ),
     (
         "Table III",
-        "Table III: ALF takes 36.84 s for 20 s of motion, exactly as LM2 with partitioning",
+        "Table III: ALF takes 36.84 s for a second of motion, exactly as LM2 with partitioning",
         "ALF needs 3286 steps for a second and LM2 with partitioning 103, so equal times are impossible: one "
         "number is probably a copy",
     ),
