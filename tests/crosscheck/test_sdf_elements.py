@@ -72,9 +72,11 @@ DYNAMICS = (
 )
 
 
-def test_friction_of_a_hinge_is_left_out_on_request_and_its_spring_stays(tmp_path: Path) -> None:
+def test_friction_of_a_hinge_is_refused_or_left_out_and_its_spring_stays(tmp_path: Path) -> None:
     """The hinge has dry friction 7 N m and a spring of 3 N m/rad."""
     rough = DYNAMICS.replace("<friction>0", "<friction>7")
+    with pytest.raises(SceneError, match="dry friction of joint 'j': it changes the motion"):
+        read(tmp_path, LINK + hinge(rough))
     found = read(tmp_path, LINK + hinge(rough), without=["friction"])
     assert found.left_out == ("dry friction of joint 'j' (--without friction)",)
     assert [(load.type, load.stiffness) for load in found.scene.load] == [("torsion_spring", 3.0)]

@@ -5,6 +5,7 @@ import re
 import shlex
 from xml.etree import ElementTree
 
+import matplotlib.figure
 import pytest
 from markdown_it import MarkdownIt
 
@@ -18,6 +19,7 @@ from mbref.scenes import find_scene
 from reports import sections
 from reports.__main__ import main as report
 from reports.blocks import Card, Figure, Heading, Listing, Matrix, Record, Table, Text, Verdict
+from reports.figures import svg
 from reports.keep import keep
 from reports.render import html, markdown
 from reports.runs import Run, SceneRuns
@@ -124,6 +126,13 @@ def test_page_and_markdown_of_a_report_show_a_name_without_acting_on_its_markup(
     heading = next(block for block in tokens if block.type == "inline").children
     assert "".join(token.content for token in heading) == name.replace("`", "")
     assert [token.content for token in tokens if token.type == "fence"] == [f"```\n{name}\n"]
+
+
+def test_figures_of_a_report_show_a_name_letter_by_letter():
+    """Dollar signs, underscores and braces begin no formula; `<` is escaped once."""
+    figure = matplotlib.figure.Figure()
+    figure.text(0.5, 0.5, "$x_1$ {y} <b>")
+    assert "$x_1$ {y} <b>" in "".join(ElementTree.fromstring(svg(figure, "one")).itertext())
 
 
 @pytest.mark.parametrize("name", NAMES)
