@@ -64,6 +64,11 @@ def best_family(settings: Sequence[Setting]) -> list[Setting]:
     return [setting for setting in settings if setting.family == best]
 
 
+def unknown_family(engine: str, family: str) -> ValueError:
+    """Return the error of a family of settings that an engine does not have."""
+    return ValueError(f"{engine} has no family of settings {family!r}; see `crosscheck list settings`")
+
+
 def fineness(setting: Setting) -> float:
     """Return the step (s) or the tolerance of a setting; 1 if it has neither."""
     return float(next((setting.options[n] for n in ("step", *TOLERANCES) if n in setting.options), 1.0))

@@ -76,7 +76,7 @@ def comparison(out: Path, wanted: Runs, notice: Notice) -> Collection:
         for pair in unable:
             notice(f"{shown_name(pair.engine)} cannot run {pair.scene.name}: {pair.cannot}")
         if not cases:
-            raise RequestError("no engine can run these scenes")
+            raise RequestError("no engine can run these scenes; see `crosscheck list support`")
         return cases
 
     return collected(

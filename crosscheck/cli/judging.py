@@ -109,7 +109,8 @@ def write_reference(arguments: argparse.Namespace) -> int:
     table = reference_table(scene, times, arguments.reference_time)
     if not len(table["time"]):
         raise RequestError(
-            f"{scene.name}: no reference was found in {arguments.reference_time:g} CPU seconds"
+            f"{scene.name}: no reference was found in {arguments.reference_time:g} CPU seconds; "
+            "raise --reference-time or shorten the motion"
         )
     write(table, Path(arguments.out))
     reached = float(table["time"][-1])

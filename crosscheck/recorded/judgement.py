@@ -104,7 +104,7 @@ def _as_recording(scene: Scene, motion: Any) -> Recording:
 def _of_columns(scene: Scene, columns: dict[str, np.ndarray]) -> Recording:
     """Return columns as a recording; raises SceneError if a column is missing, too short or not finite."""
     if "time" not in columns:
-        raise SceneError(["the motion has no column time"])
+        raise SceneError(["the motion has no column time; give the times of its rows (s)"])
     times, known = columns.pop("time"), names(scene)
     found = {name: column for name, column in columns.items() if name in known}
     if not found:
@@ -113,7 +113,7 @@ def _of_columns(scene: Scene, columns: dict[str, np.ndarray]) -> Recording:
         if column.shape != times.shape or column.ndim != 1 or not len(column):
             raise SceneError([f"column {name}: must have one number for each time"])
         if not np.isfinite(column).all():
-            raise SceneError([f"column {name}: is not finite"])
+            raise SceneError([f"column {name}: is not finite; leave out such columns or rows"])
     if times[0] < 0 or np.any(np.diff(times) <= 0):
         raise SceneError(["column time: times must not be negative and must increase"])
     return Recording(times, found)

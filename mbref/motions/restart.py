@@ -60,7 +60,7 @@ def _from_time(load: Load, t: float) -> Load | None:
 def _sample(motion: Trajectory, t: float) -> int:
     """Return the index of the sample at t (s); raises InputError that names the nearest one."""
     if not motion.times.size:
-        raise InputError("scene_at: the motion has no sample")
+        raise InputError("scene_at: the motion has no sample; simulate it with sample times")
     k = int(np.abs(motion.times - t).argmin())
     if not abs(motion.times[k] - t) <= SAME_TIME * max(1e-300, float(motion.times[-1])):
         raise InputError(f"scene_at: no sample at {t:g} s; the nearest one is at {motion.times[k]:.9g} s")

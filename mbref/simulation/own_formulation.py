@@ -163,7 +163,7 @@ class _OwnRun:
         solver = DOP853(rates, self.t, y, stop, rtol=rtol, atol=atol, first_step=first)
         while solver.status == "running":
             if self.steps >= limits.most_steps:
-                raise _End(Outcome.STEP_FAILED, f"{self.steps} steps did not reach the end")
+                raise _End(Outcome.STEP_FAILED, f"{self.steps} steps did not reach the end; raise most_steps")
             solver.max_step = self._longest(solver.y[size:])
             if message := solver.step():
                 raise _End(Outcome.STEP_FAILED, message)

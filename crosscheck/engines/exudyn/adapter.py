@@ -27,6 +27,7 @@ from crosscheck.engines.shared.fixed_steps import unended_piece
 from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.tolerances import RANK
 from crosscheck.linearising import Linearising
+from crosscheck.setting import unknown_family
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Driver, Scene
@@ -144,7 +145,7 @@ class Exudyn(Linearising, Engine):
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """Simulate a scene; raises ValueError for an unknown family."""
         if setting.family not in self.families:
-            raise ValueError(f"{self.name} has no family of settings {setting.family!r}")
+            raise unknown_family(self.name, setting.family)
         exu = _exudyn()
         times, step = np.array(times, dtype=float), float(setting.options["step"])
         with _warnings(exu) as warnings:

@@ -32,6 +32,7 @@ from crosscheck.engines.shared.driver_motion import motion, stated_rate
 from crosscheck.engines.shared.sampling import Adaptive, Counts, Failed, Sample, step_count
 from crosscheck.engines.shared.tree_reactions import LinkMotion, joint_reactions, wrench
 from crosscheck.judge.time_functions import next_end
+from crosscheck.setting import unknown_family
 from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Driver, Scene
@@ -79,7 +80,7 @@ class Simulation:
         elif setting.family in ("tuned", "stiff", *INTEGRATED_HERE):
             self._harden(options.get("beta", 0.0), options.get("hard", HARD))
         else:
-            raise ValueError(f"mujoco has no family of settings {setting.family!r}")
+            raise unknown_family("mujoco", setting.family)
         turn = options.get("turn", TURN_PER_STEP)
         self.longest = turn / stated_rate(scene) if scene.driver else np.inf
         if setting.family in COMPILED:

@@ -28,6 +28,7 @@ from crosscheck.engines.shared.driver_motion import motion, stated_rate
 from crosscheck.engines.shared.sampling import Adaptive, Counts, Failed, Sample, rk4
 from crosscheck.engines.shared.tree_reactions import LinkMotion, sample_of
 from crosscheck.judge.constraints import scene_length
+from crosscheck.setting import unknown_family
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
 
@@ -109,7 +110,7 @@ class Simulation:
             adaptive = Adaptive(self.rhs, settle, setting.options["rtol"], *limits, self.counts)
             self.step = adaptive.advance
         else:
-            raise ValueError(f"pinocchio has no family of settings {family!r}")
+            raise unknown_family("pinocchio", family)
 
     def _max_step(self) -> float:
         if not self.driven:

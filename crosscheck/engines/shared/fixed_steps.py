@@ -16,6 +16,7 @@ from crosscheck.engines.shared.spanning_tree import Closure, Tree
 from crosscheck.engines.shared.tree_reactions import LinkMotion, applied, sample_of
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.time_functions import ends
+from crosscheck.setting import unknown_family
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.rotations import unit
 from mbref.scene import Moment, Scene
@@ -76,7 +77,7 @@ def simulated(
     """Return the trajectory of the simulation that ``make`` constructs; raises ValueError for an unknown
     family."""
     if setting.family not in engine.families:
-        raise ValueError(f"{engine.name} has no family of settings {setting.family!r}")
+        raise unknown_family(engine.name, setting.family)
     start = time.process_time()
     with np.errstate(all="ignore"):
         run = make()

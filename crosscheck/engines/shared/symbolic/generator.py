@@ -18,6 +18,7 @@ from crosscheck.engines.shared.initial_velocities import lacks_mass
 from crosscheck.engines.shared.sampling import Counts, Failed, Sample, run_through
 from crosscheck.engines.shared.symbolic.equations import TreeEquations
 from crosscheck.engines.shared.tree_reactions import joint_reactions
+from crosscheck.setting import unknown_family
 from mbref import rotations
 from mbref.motions.trajectory import Cost, Trajectory
 from mbref.scene import Scene
@@ -64,7 +65,7 @@ class Generator(Engine):
 
     def _known(self, setting: Setting) -> None:
         if setting.family not in self.families:
-            raise ValueError(f"{self.name} has no family of settings {setting.family!r}")
+            raise unknown_family(self.name, setting.family)
 
     def _trajectory(
         self,
