@@ -10,11 +10,9 @@ from crosscheck.judge import joint_coordinates, time_functions
 from crosscheck.judge.equations_of_motion import accelerations as of_terms
 from crosscheck.judge.equations_of_motion import scaled_terms, terms_at, variants
 from crosscheck.judge.gauss_motion import accelerations, gauss_motion
-from crosscheck.judge.joint_loads import joint_wrenches, turning_loads
 from crosscheck.judge.joint_residuals import joint_frames, position_rows, with_ground
-from crosscheck.judge.loads import Motion, wrenches
 from mbref import rotations
-from mbref.scene import Body, Driver, Fixed, Force, Moment, Revolute, Scene, Sine, TorsionSpring
+from mbref.scene import Body, Driver, Fixed, Force, Moment, Revolute, Scene, TorsionSpring
 from tests.helpers.parts import X, Y, Z, joint
 
 GROUND_B = ("ground", "b")
@@ -28,22 +26,6 @@ def body(name: str = "b", **parts: object) -> Body:
 
 # --- functions of time ------------------------------------------------------------------------------------
 TABLE = ((0.0, 0.0), (0.3, 0.2), (0.5, -0.1), (0.9, 0.4), (1.4, 0.0))
-LAW = Driver(
-    joint="J",
-    polynomial=(-0.2 * math.sin(0.7), 0.5, -0.3, 0.2),
-    sine=Sine(amplitude=0.2, frequency=3.0, phase=0.7),
-)
-
-
-@pytest.mark.parametrize("derivative", range(5))
-def test_derivatives_of_a_polynomial_with_a_sine_equal_their_formulas(derivative):
-    """NumPy's derivative of the polynomial; the k-th derivative of a sin(w t + p) is a wᵏ sin(w t + p + k
-    π/2)."""
-    t = np.array([0.0, 0.4, 1.1])
-    smooth = np.polynomial.Polynomial((-0.2 * math.sin(0.7), 0.5, -0.3, 0.2))
-    wave = 0.2 * 3.0**derivative * np.sin(3.0 * t + 0.7 + derivative * math.pi / 2)
-    wanted = (smooth.deriv(derivative) if derivative else smooth)(t) + wave
-    assert time_functions.value(LAW, t, derivative) == pytest.approx(wanted, abs=1e-13)  # rounding of 20
 
 
 @pytest.mark.parametrize("derivative", range(4))
@@ -84,11 +66,11 @@ def test_pieces_of_a_scenes_functions_end_at_rows_of_tables_and_at_start_and_sto
 # --- joints -----------------------------------------------------------------------------------------------
 
 
-def residual(given: dict, place, q=UNIT, driver: tuple[Driver, ...] = (), t: float = 0.0) -> list[float]:
+def residual(given: dict, place, q) -> list[float]:
     """Return residuals (m, rad) of a joint between the ground and a body at a pose, for an anchor at 0."""
-    scene = Scene(name="s", body=(body(),), joint=(given,), driver=driver)
+    scene = Scene(name="s", body=(body(),), joint=(given,))
     pose = with_ground(np.array([place], dtype=float), np.array([q], dtype=float))
-    return position_rows(joint_frames(scene)[0], np.asarray(t), *pose).tolist()
+    return position_rows(joint_frames(scene)[0], np.zeros(()), *pose).tolist()
 
 
 def about(axis, angle: float) -> np.ndarray:
@@ -118,27 +100,6 @@ def test_residuals_of_joints_are_displacements_and_angles_that_they_prevent():
     assert residual(at_origin("planar", axis=Z), moved, about(Y, -0.3)) == pytest.approx([0.3, -0.3, 0.0])
 
 
-def test_residual_of_a_universal_joint_is_the_angle_that_its_axes_lack_to_a_right_one():
-    """The second axis, y, turns by 0.3 rad towards the first one, reversed: -x."""
-    cross = at_origin("universal", axes=(X, Y))
-    assert residual(cross, (0.1, 0.2, 0.3), about(Z, 0.3))[3] == pytest.approx(-0.3)
-
-
-def test_residual_of_a_distance_joint_is_the_elongation_of_its_rod():
-    """The ends are 2 m apart at the start, and 5 m after a motion by (-2, 3, 4) m."""
-    rod = at_origin("distance", anchors=((0.0, 0.0, 0.0), (2.0, 0.0, 0.0)))
-    assert residual(rod, (-2.0, 3.0, 4.0)) == pytest.approx([3.0])
-
-
-def test_residual_of_a_driver_is_the_coordinate_less_its_law():
-    """The law is 0.5 t: 2 - 0.5 rad at 1 s, 0.3 rad after a full turn at 4π s, 0.3 - 0.5 m at 1 s."""
-    law = (Driver(joint="J", polynomial=(0.0, 0.5)),)
-    hinge, rail = at_origin("revolute", axis=Z), at_origin("translational", axis=Z)
-    assert residual(hinge, (0, 0, 0), about(Z, 2.0), law, 1.0)[-1] == pytest.approx(1.5)
-    assert residual(hinge, (0, 0, 0), about(Z, 0.3), law, 4 * math.pi)[-1] == pytest.approx(0.3)
-    assert residual(rail, (0.1, 0.2, 0.3), UNIT, law, 1.0)[-1] == pytest.approx(0.3 - 0.5)
-
-
 # --- coordinates ------------------------------------------------------------------------------------------
 
 
@@ -154,40 +115,10 @@ def test_turns_are_unknown_where_rates_near_a_step_differ_by_half_a_turn(rate, k
     assert np.isnan(found).tolist() == [False] * known + [True] * (6 - known)
 
 
-# --- loads ------------------------------------------------------------------------------------------------
 def at_rest(scene: Scene):
     """Return r, q, v, ω and the turned angles of loads: none moves or is turned, and no load has an angle."""
     places = np.array([b.position for b in scene.body])
     return places, np.tile(UNIT, (len(places), 1)), 0 * places, 0 * places, np.zeros(0)
-
-
-def hinged(load) -> Scene:
-    hinge = Revolute(name="J", bodies=("a", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 2.0))
-    return Scene(name="s", body=(body("a"), body("b")), joint=(hinge,), load=load)
-
-
-def test_a_torsion_spring_has_opposite_moments_about_its_joint_or_a_common_axis():
-    """4 N m/rad · (0.7 - 0.2) rad + 0.5 N m s/rad · 3 rad/s = 3.5 N m, by `joint_wrenches`, and for a planar
-    motion by `wrenches` about its axis, whose sense is free."""
-    scene = hinged((TorsionSpring(joint="J", stiffness=4.0, damping=0.5, natural_angle=0.2),))
-    still = np.zeros((2, 3))
-    spins = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 4.0]])
-    pose, twist = (still, np.tile(UNIT, (2, 1))), (still, spins)
-    found = joint_wrenches(scene, 0.0, pose, twist, np.array([0.7]))
-    wanted = np.zeros((2, 6))
-    wanted[:, 5] = 3.5, -3.5
-    assert found == pytest.approx(wanted) and len(turning_loads(scene)) == 1
-    turn = np.array([[0.3, 1.0]])
-    motion = Motion(still[None], np.tile(np.eye(3), (1, 2, 1, 1)), still[None], spins[None], turn)
-    for axis in (Z, (0.0, 0.0, -1.0)):
-        sense = axis[2]
-        along = motion.__class__(
-            motion.position, motion.rotation, motion.velocity, motion.angular_velocity, sense * turn
-        )
-        _, moment = wrenches(scene, along, np.array(axis))
-        assert moment[0, :, 2] == pytest.approx([3.5, -3.5])
-    _, moment = wrenches(scene, motion, np.zeros(3))
-    assert not moment.any(), "without an axis the loads of joints are left out"
 
 
 # --- terms ------------------------------------------------------------------------------------------------
