@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from crosscheck.judge.constraints import initial_twists
+from crosscheck.judge.pieces import at_start
 from crosscheck.judge.start import started
 from crosscheck.study.search.offers import remember
 from mbref import formats
@@ -71,7 +72,7 @@ def _started(name: str, reading: ImportOptions, notice: Notice) -> Scene:
     scene = held(find_scene(name), reading.hold)
     if name not in SCENES and Path(name).exists():
         try:
-            initial_twists(started(scene))
+            initial_twists(at_start(started(scene)))
         except SceneError as error:
             raise SceneError(with_lines(Path(name).read_text(encoding="utf-8-sig"), error.faults)) from None
     return scene

@@ -13,7 +13,7 @@ from crosscheck.judge.tolerances import ROUNDING
 from crosscheck.refusals import FACTOR, TABLE
 from crosscheck.setting import BRANCHES, FamilyParts
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import JOINT_TYPES, LOAD_TYPES, Scene
+from mbref.scene import JOINT_TYPES, LOAD_TYPES, Scene, intermittent
 from mbref.scene.joints import Coordinate
 
 if TYPE_CHECKING:
@@ -81,6 +81,7 @@ class Mbref(Engine):
         over_time=(TABLE, FACTOR),
         massless_links=True,
         sums=True,
+        intervals=True,
     )
 
     def version(self) -> str:
@@ -91,7 +92,7 @@ class Mbref(Engine):
     def refuses(self, scene: Scene) -> Cannot | None:
         from mbref.equations.counts import undriven_freedoms
 
-        if not scene.has_mass() and undriven_freedoms(scene) > 0:
+        if not scene.has_mass() and (any(intermittent(scene)) or undriven_freedoms(scene) > 0):
             return Cannot(
                 Owner.MODEL,
                 "bodies without mass can be moved only where the drivers prescribe the whole motion",
@@ -113,9 +114,10 @@ class Mbref(Engine):
     def serves(self, scene: Scene, family: str) -> bool:
         from mbref.equations.counts import counts, undriven_freedoms
         from mbref.method import bushings
+        from mbref.motions.pieces import first_piece
         from mbref.simulation.simulate import why_no_code
 
-        method = _method(family)
+        method, scene = _method(family), first_piece(scene)
         if method.is_series and bushings(scene):
             return False
         if method.formulation.needs_independent_columns and undriven_freedoms(scene) > 0:

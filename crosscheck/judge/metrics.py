@@ -13,7 +13,7 @@ from typing import Any, Literal, overload
 
 import numpy as np
 
-from crosscheck.judge import constraints
+from crosscheck.judge import constraints, events
 from crosscheck.judge.energy import energy_series
 from crosscheck.judge.joint_reactions import SAMPLES, compare
 from crosscheck.judge.reaction_balance import with_exact_reactions
@@ -45,11 +45,13 @@ class Metric:
     """A metric; ``function(scene, trajectory, exact)`` returns its value, or None if the metric is not
     defined. ``exact`` is the truth's trajectory at the run's times or the first of these times, or None.
     Numbers are never NaN; a trajectory that is not finite has infinite errors.
+    With ``per_piece``, the metric of a scene with intervals is the largest one of its pieces.
     """
 
     function: Callable[[Scene, Trajectory, Trajectory | None], float | None]
     unit: str
     label: str
+    per_piece: bool = False
 
 
 def measure(scene: Scene, trajectory: Trajectory, truth: Truth | None = None) -> dict[str, float | None]:
@@ -79,7 +81,13 @@ def measure(scene: Scene, trajectory: Trajectory, truth: Truth | None = None) ->
     scene, trajectory = started(scene), in_scene_order(scene, trajectory)
     exact = exact_motion(trajectory, truth)
     with np.errstate(all="ignore"):  # metrics report states that are not finite, without warnings
-        found = {name: metric.function(scene, trajectory, exact) for name, metric in METRICS.items()}
+        pieces = list(events.parts(scene, trajectory, exact))
+        found = {
+            name: _largest_of([metric.function(*piece) for piece in pieces])
+            if metric.per_piece
+            else metric.function(scene, trajectory, exact)
+            for name, metric in METRICS.items()
+        }
     if exact is None or not trajectory.times.size:
         return found | {"error_bound": None, "error_until": None}
     assert truth is not None
@@ -206,6 +214,11 @@ def _velocity_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | No
     return max(worst) / float(scale) if scale > 0 else None
 
 
+def _largest_of(values: Sequence[float | None]) -> float | None:
+    """Return the largest value of pieces; None if no piece has one."""
+    return max((value for value in values if value is not None), default=None)
+
+
 def _largest(series: np.ndarray | None) -> float | None:
     if series is None or series.size == 0:
         return None
@@ -259,11 +272,16 @@ METRICS: dict[str, Metric] = {
     "rotation_error": Metric(_against_exact(rotation_error_series), "rad", "rotation error"),
     "scd": Metric(_correct_digits, "digits", "significant correct digits"),
     "velocity_error": Metric(_velocity_error, "", "relative velocity error"),
-    "violation_position": Metric(_violation(0), "rad", "violation of position constraints"),
-    "violation_velocity": Metric(_violation(1), "rad/s", "violation of velocity constraints"),
-    "violation_acceleration": Metric(_violation(2), "rad/s²", "violation of acceleration constraints"),
-    "energy_error": Metric(_energy, "", "drift of the energy balance / largest energy"),
-    "reaction_error": Metric(reaction_error, "", "error of unique reactions / largest true reaction"),
+    "violation_position": Metric(_violation(0), "rad", "violation of position constraints", True),
+    "violation_velocity": Metric(_violation(1), "rad/s", "violation of velocity constraints", True),
+    "violation_acceleration": Metric(_violation(2), "rad/s²", "violation of acceleration constraints", True),
+    "energy_error": Metric(_energy, "", "drift of the energy balance / largest energy", True),
+    "reaction_error": Metric(reaction_error, "", "error of unique reactions / largest true reaction", True),
+    "impact_error": Metric(events.impact_error, "", "error of velocities after impacts / largest velocity"),
+    "impulse_error": Metric(events.impulse_error, "", "momentum balance of impacts / largest change"),
+    "impact_energy_error": Metric(
+        events.impact_energy_error, "", "energy balance of impacts / energy before"
+    ),
 }
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from crosscheck.judge.gauss_principle import rank_of, singular_values
+from crosscheck.judge.pieces import at_start
 from mbref.scene import Scene
 
 
@@ -18,7 +19,9 @@ class Mobility(NamedTuple):
 
 
 def mobility(scene: Scene) -> Mobility:
-    """Return the mobility of a scene at its start, where anchors of joints coincide."""
+    """Return the mobility of a scene at its start, where anchors of joints coincide, and of the joints and
+    couplings that hold there."""
+    scene = at_start(scene)
     if not scene.joint:
         return Mobility(0, 0, 6 * len(scene.body))
     rows, rank = row_count(scene), rank_of(singular_values(scene))

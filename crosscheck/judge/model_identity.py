@@ -20,6 +20,7 @@ from crosscheck.judge.energy import kinetic_energy, potential_energy
 from crosscheck.judge.gauss_motion import accelerations
 from crosscheck.judge.joint_loads import turning_loads
 from crosscheck.judge.metrics import in_scene_order
+from crosscheck.judge.pieces import at_start, has_pieces
 from crosscheck.judge.time_functions import value
 from crosscheck.judge.tolerances import (
     GATE_TIME,
@@ -77,8 +78,9 @@ def differences(
     """Return for each engine the first difference of its trajectory from the first trajectory, as in `gate`.
 
     ``rounding`` has the relative rounding of each engine's numbers, by name; engines without an entry compute
-    in double precision.
+    in double precision. Scenes with intervals are compared as they start.
     """
+    scene = at_start(scene)
     reference, *others = (in_scene_order(scene, trajectory) for trajectory in trajectories)
     found: dict[str, Difference] = {}
     for other in others:
@@ -96,8 +98,10 @@ def along(scene: Scene, run: Trajectory) -> Difference | None:
     equations at the run's own states. Some samples are compared. None without accelerations or masses.
 
     Errors of the integration have no influence, since the run is not compared with a motion.
-    Samples next to singular positions are left out.
+    Samples next to singular positions are left out. None for a scene with intervals.
     """
+    if has_pieces(scene):
+        return None
     run, length = in_scene_order(scene, run), scene_length(scene)
     linear, angular = run.acceleration, run.angular_acceleration
     if linear is None or angular is None or not scene.has_mass():

@@ -14,6 +14,7 @@ from crosscheck.judge.constraints import (
     joint_coordinates,
     scene_length,
 )
+from crosscheck.judge.pieces import at_start
 from mbref.scene import Scene, SceneError
 
 MET = 1e-12  # residual over the mechanism's length (m) or over 1 rad; rounding leaves 1e-15
@@ -24,7 +25,7 @@ def started(scene: Scene) -> Scene:
 
     Raises SceneError if no pose obeys the offsets, or if the assembled poses violate a joint or a coupling.
     """
-    if not any(coupling.offset for coupling in scene.coupling):
+    if not any(coupling.offset for coupling in at_start(scene).coupling):
         return scene
     from mbref import angles_at_start, assembled
 

@@ -8,7 +8,7 @@ from tests.meta.imports import ROOT, children, circles, floors, graph, imported,
 
 DOORS = (
     r"command_line|files|formats|printable|terminal|scene(\.(fields|joints|loads|toml|units|validation))?"
-    r"|scenes(\.\w+)?|motions\.(crossing|trajectory)|rotations|records|__version__"
+    r"|scenes(\.\w+)?|motions\.(crossing|event|trajectory)|rotations|records|__version__"
     r"|angles_at_start|assembled|counts"  # functions of scenes, whose results the judge checks
 )
 ALLOWED = {  # package → the names of mbref that it may import

@@ -29,6 +29,8 @@ SOURCES = (
     JUDGE / "constraints.py",
     JUDGE / "joint_residuals.py",
     JUDGE / "joint_coordinates.py",
+    JUDGE / "impacts.py",
+    JUDGE / "pieces.py",
     JUDGE / "time_functions.py",
 )
 DIGEST = hashlib.sha256().digest_size

@@ -20,6 +20,7 @@ from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference import cache
 from crosscheck.judge.reference.bound import USEFUL, bounds, differences, rounding
 from crosscheck.judge.reference.motion import OVER, Motion, Times
+from crosscheck.judge.reference.piecewise import motion_by
 from crosscheck.judge.reference.taylor import DATA, natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref.scene import Scene
@@ -107,17 +108,17 @@ def runs(scene: Scene, times: np.ndarray, seconds: float) -> tuple[Motion, Motio
     If A runs out of time and B continues, as with stiff dampers, return the motion by B, by a second run of
     B, and by A.
     """
-    a = natural_motion(scene, times, EXTENDED, seconds=SHARE * seconds)
+    a = motion_by(natural_motion, scene, times, EXTENDED, seconds=SHARE * seconds)
     left, moved = seconds - a.seconds, max(DATA, a.contradiction) if a.contradiction > CONSISTENT else 0.0
     if a.reason == OVER:
-        b = tree_motion(scene, times, EXTENDED, seconds=left / 2)
+        b = motion_by(tree_motion, scene, times, EXTENDED, seconds=left / 2)
         if len(b.times) > len(a.times):
             return b, _second(tree_motion, scene, b.times, moved, left - b.seconds), a
         return a, _second(natural_motion, scene, a.times, moved, left - b.seconds), b
     if not len(a.times):
         return a, a, a
     second_run = _second(natural_motion, scene, a.times, moved, SHARE * left)
-    return a, second_run, tree_motion(scene, a.times, EXTENDED, seconds=left - second_run.seconds)
+    return a, second_run, motion_by(tree_motion, scene, a.times, EXTENDED, seconds=left - second_run.seconds)
 
 
 def _second(
@@ -125,7 +126,8 @@ def _second(
 ) -> Motion:
     """Return the second run of a formulation: A of another order, B on fewer points; with other rows and
     displaced joints."""
-    return formulation(
+    return motion_by(
+        formulation,
         scene,
         times,
         EXTENDED,

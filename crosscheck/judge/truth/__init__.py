@@ -13,6 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
+from crosscheck.judge.pieces import has_pieces
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.start import started
 from crosscheck.judge.time_functions import ends
@@ -105,12 +106,13 @@ def closed_form(scene: Scene) -> Truth | None:
     """Return the truth of a scene of a known family, or None. The truth is cached with the part of the motion
     that is already solved.
 
-    No known family has couplings, armatures, tables, loads over time or, except torsion springs, loads of
-    joints.
+    No known family has couplings, intervals, armatures, tables, loads over time or, except torsion springs,
+    loads of joints.
     """
     varies = any(load.over_time for load in scene.load) or any(ends(driver) for driver in scene.driver)
     pushed = any(isinstance(load, JointLoad) and not isinstance(load, TorsionSpring) for load in scene.load)
-    if varies or pushed or scene.coupling or any(joint.reflected_inertia for joint in scene.joint):
+    others = varies or pushed or scene.coupling or has_pieces(scene)
+    if others or any(joint.reflected_inertia for joint in scene.joint):
         return None
     for family in PATHS:
         if truth := one_dof(scene, family(scene)):

@@ -1,0 +1,140 @@
+"""Events of a run, by the judge: its pieces, from the poses at its own events, and the balances there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from crosscheck.judge.constraints import joint_coordinates, scene_length
+from crosscheck.judge.impacts import impact
+from crosscheck.judge.joint_reactions import resultants
+from crosscheck.judge.loads import world_inertia
+from crosscheck.judge.pieces import State, at_start, has_pieces, later
+from mbref import rotations
+from mbref.motions.event import Event
+from mbref.motions.trajectory import PER_BODY, Trajectory
+from mbref.scene import JointLoad, Scene
+
+
+def parts(
+    scene: Scene, trajectory: Trajectory, exact: Trajectory | None
+) -> Iterator[tuple[Scene, Trajectory, Trajectory | None]]:
+    """Yield scene, samples and exact motion of each piece of a run, whose times count from its begin.
+
+    A scene without intervals has one piece. A run without events has none, as its constraints are not known.
+    """
+    if not has_pieces(scene):
+        yield scene, trajectory, exact
+        return
+    begin, turned = 0.0, dict[str, float]()
+    for end, piece in _pieces(scene, trajectory):
+        own = _between(trajectory, begin, end, turned)
+        if own.times.size:
+            yield piece, own, None if exact is None else _between(exact, begin, end, {})
+        begin = end
+        turned = next((dict(e.angles) for e in trajectory.events or () if e.time == end), {})
+
+
+def _pieces(scene: Scene, trajectory: Trajectory) -> Iterator[tuple[float, Scene]]:
+    """Yield the end (s) and the scene of each piece of a run, from the states at its events."""
+    if trajectory.events is None:
+        return
+    piece = at_start(scene)
+    for event in trajectory.events:
+        yield event.time, piece
+        piece = _after(scene, piece, event)
+    yield np.inf, piece
+
+
+def _after(scene: Scene, piece: Scene, event: Event) -> Scene:
+    """Return the piece that begins at an event of a run, with the run's velocities after it."""
+    state = State(event.position, event.orientation, event.velocity_after, event.angular_velocity_after)
+    return later(scene, piece, event.time, state, _moved(scene, event))
+
+
+def _moved(scene: Scene, event: Event) -> dict[str, np.ndarray]:
+    """Return angle (rad, as the run counted it, or NaN) and displacement (m) (2,) of joints with loads."""
+    always = scene.with_(joint=[joint for joint in scene.joint if joint.active is None], coupling=(), load=())
+    pose = event.position[None], event.orientation[None], 0.0 * event.angular_velocity[None]
+    found = joint_coordinates(always, np.zeros(1), *pose)
+    loads = [load for load in scene.load if isinstance(load, JointLoad)]
+    return {
+        load.joint: np.array([event.angles.get(load.joint, np.nan), found[load.joint][0, 1]])
+        for load in loads
+    }
+
+
+def _between(motion: Trajectory, begin: float, end: float, turned: dict[str, float]) -> Trajectory:
+    """Return the samples from begin to end (s), with times and angles (rad) from the begin."""
+    chosen = (motion.times >= begin) & (motion.times < end)
+    arrays: dict[str, Any] = {k: None if (a := getattr(motion, k)) is None else a[chosen] for k in PER_BODY}
+    tables: dict[str, Any] = {
+        key: values and {name: rows[chosen] for name, rows in values.items()}
+        for key in ("reactions", "angles")
+        for values in [getattr(motion, key)]
+    }
+    if tables["angles"]:
+        tables["angles"] = {n: rows - turned.get(n, 0.0) for n, rows in tables["angles"].items()}
+    return replace(motion, times=motion.times[chosen] - begin, **arrays, **tables, events=None)
+
+
+def impulse_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
+    """Return the largest difference of a body's change of momentum at an event from the impulses of its
+    joints, relative to the largest change; None without impulses."""
+    off, scale = [0.0], [0.0]
+    for event, after in _impacts(scene, trajectory):
+        bare = after.with_(joint=[joint for joint in after.joint if joint.name in event.impulses])
+        units = np.repeat([1.0, scene_length(scene)], 3)
+        change = _momentum_change(scene, event) / units
+        one = {name: wrench[None] for name, wrench in event.impulses.items()}
+        state: dict[str, Any] = {"position": event.position[None], "orientation": event.orientation[None]}
+        pulls = resultants(bare, replace(trajectory, **state, reactions=one), 0) / units
+        off.append(float(np.abs(change - pulls).max()))
+        scale.append(float(np.abs(change).max()))
+    return max(off) / max(scale) if max(scale) else None
+
+
+def impact_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
+    """Return the largest error of a velocity after an event, from the run's own velocities before it; angular
+    velocities times the scene's length, relative to the largest velocity before; None without impacts."""
+    off, scale, length = [0.0], [0.0], scene_length(scene)
+    for event, after in _impacts(scene, trajectory):
+        before = State(event.position, event.orientation, event.velocity, event.angular_velocity)
+        found = impact(after, before).state
+        off.append(float(np.abs(found.velocity - event.velocity_after).max()))
+        off.append(length * float(np.abs(found.angular_velocity - event.angular_velocity_after).max()))
+        scale += [float(np.abs(event.velocity).max()), length * float(np.abs(event.angular_velocity).max())]
+    return max(off) / max(scale) if max(scale) else None
+
+
+def impact_energy_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
+    """Return the largest difference of the energy lost at an event from the kinetic energy of the lost
+    velocities, relative to the energy before; None with drivers, which do work."""
+    off = []
+    for event, after in _impacts(scene, trajectory):
+        before = State(event.position, event.orientation, event.velocity, event.angular_velocity)
+        if not scene.driver and event.energy_before:
+            lost = event.energy_before - event.energy_after
+            off.append(abs(lost - impact(after, before).lost) / event.energy_before)
+    return max(off, default=None)
+
+
+def _impacts(scene: Scene, trajectory: Trajectory) -> Iterator[tuple[Event, Scene]]:
+    """Yield the events of a run at which constraints begin to hold, with the scene after each."""
+    if not has_pieces(scene) or not trajectory.events:
+        return
+    scenes = [piece for _, piece in _pieces(scene, trajectory)]
+    for event, after in zip(trajectory.events, scenes[1:], strict=True):
+        if event.engaged:
+            yield event, after
+
+
+def _momentum_change(scene: Scene, event: Event) -> np.ndarray:
+    """Return the changes (nb, 6) of momentum and of angular momentum about the centres of mass, world."""
+    mass = np.array([body.mass or 0.0 for body in scene.body])[:, None]
+    inertia = world_inertia(scene, rotations.to_matrix(event.orientation[None]))[0]
+    spin = event.angular_velocity_after - event.angular_velocity
+    return np.hstack([mass * (event.velocity_after - event.velocity), np.einsum("bij,bj->bi", inertia, spin)])

@@ -1,0 +1,151 @@
+"""Pieces of a motion between the times at which joints and couplings begin or cease to hold, by the judge.
+
+A piece is a scene of its own, whose time counts from its begin.  A joint begins to hold at the anchor and the
+axis that its first body carries; the second body then carries the anchor.  A distance joint keeps the
+distance, and a coupling the sum, of the moment at which it begins to hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from crosscheck.judge.constraints import closure, length_rows, scene_length
+from mbref import rotations
+from mbref.scene import GROUND, Body, Joint, JointLoad, Scene, SceneError
+from mbref.scene.joints import ANGLE
+
+MISSED = 1e-6  # gap of a given pose (lengths of the mechanism, or rad) above which a joint cannot engage
+PERMANENT: dict[str, Any] = {"active": None, "engages": "anywhere"}
+
+
+class State(NamedTuple):
+    """Positions (nb, 3), orientations (nb, 4), velocities and angular velocities (nb, 3), world axes."""
+
+    position: np.ndarray
+    orientation: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+
+
+def has_pieces(scene: Scene) -> bool:
+    """Return whether a joint or a coupling of the scene has intervals."""
+    return any(part.active is not None for part in (*scene.joint, *scene.coupling))
+
+
+def events(scene: Scene, end: float) -> list[float]:
+    """Return the times (s) in (0, end] at which a joint or a coupling begins or ceases to hold."""
+    parts = (*scene.joint, *scene.coupling)
+    times = {time for part in parts for interval in part.active or () for time in interval}
+    return sorted(time for time in times if 0.0 < time <= end)
+
+
+def at_start(scene: Scene) -> Scene:
+    """Return the scene with the parts that hold from t = 0 on; without intervals the scene itself."""
+    if not has_pieces(scene):
+        return scene
+    return scene.with_(
+        joint=[_permanent(part) for part in scene.joint if holds(part, 0.0)],
+        coupling=[_permanent(part) for part in scene.coupling if holds(part, 0.0)],
+    )
+
+
+def holds(part: Any, t: float) -> bool:
+    """Return whether a joint or a coupling holds from t (s) on."""
+    return part.active is None or any(first <= t < last for first, last in part.active)
+
+
+def _permanent(part: Any) -> Any:
+    return part.model_copy(update=PERMANENT)
+
+
+def later(scene: Scene, before: Scene, t: float, state: State, moved: Mapping[str, np.ndarray]) -> Scene:
+    """Return the piece that begins at t (s) in a state, after the piece ``before``.
+
+    ``moved`` has angle (rad, full turns counted) and displacement (m) since t = 0 of the joints with loads.
+    Raises SceneError if a joint does not meet a given pose.
+    """
+    return scene.with_(
+        duration=max(scene.duration - t, 1e-3 * scene.duration),
+        body=[_moved(body, b, state) for b, body in enumerate(scene.body)],
+        joint=[_placed(scene, before, joint, t, state) for joint in scene.joint if holds(joint, t)],
+        coupling=[
+            part.model_copy(update={**PERMANENT, "offset": 0.0}) for part in scene.coupling if holds(part, t)
+        ],
+        driver=[driver.from_time(t) for driver in scene.driver],
+        load=[found for load in scene.load for found in _load(scene, load, t, state, moved)],
+    )
+
+
+def _moved(body: Body, b: int, state: State) -> Body:
+    """Return a body with the pose and the velocities that it has in a state."""
+    return body.model_copy(update={key: tuple(x[b].tolist()) for key, x in state._asdict().items()})
+
+
+def _placed(scene: Scene, before: Scene, joint: Joint, t: float, state: State) -> Joint:
+    """Return a joint of the scene, which holds from t (s) on, at the poses of a state."""
+    held = next((each for each in before.joint if each.name == joint.name), None)
+    if held is None and joint.engages == "given_pose":
+        _refuse_gap(scene, joint, t, state)
+    origin, given = (scene, joint) if held is None else (before, held)
+    ends = [_carried(origin, state, *end) for end in zip(given.bodies, given.anchor_pair, strict=True)]
+    axes = [_turned(origin, state, *end) for end in zip(given.bodies, given.directions, strict=False)]
+    if len(axes) > 1:
+        along = axes[0] / np.linalg.norm(axes[0])
+        axes[1] = axes[1] - along * (along @ axes[1])
+    listed = [tuple(axis.tolist()) for axis in axes]
+    places = {
+        "anchor": tuple(ends[0 if held is None else 1].tolist()),
+        "anchors": tuple(tuple(end.tolist()) for end in ends),
+        "axis": listed[0] if listed else None,
+        "axes": tuple(listed),
+    }
+    fields = {key: place for key, place in places.items() if key in type(joint).model_fields}
+    return joint.model_copy(update={**PERMANENT, **fields})
+
+
+def _carried(scene: Scene, state: State, name: str, point: Sequence[float]) -> np.ndarray:
+    """Return the place (3,) in a state of a point (world, at the poses of the scene) of a body."""
+    if name == GROUND:
+        return np.array(point, dtype=float)
+    arm = np.array(point) - scene.body[scene.body_index(name)].position
+    return np.asarray(state.position[scene.body_index(name)] + _turned(scene, state, name, arm))
+
+
+def _turned(scene: Scene, state: State, name: str, vector: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Return the direction (3,) in a state of a vector (world, at the poses of the scene) of a body."""
+    if name == GROUND:
+        return np.array(vector, dtype=float)
+    b = scene.body_index(name)
+    own = rotations.rotate(rotations.conjugate(np.array(scene.body[b].orientation)), np.array(vector))
+    return np.asarray(rotations.rotate(state.orientation[b], own))
+
+
+def _load(scene: Scene, load: Any, t: float, state: State, moved: Mapping[str, np.ndarray]) -> Iterator[Any]:
+    """Yield a load of the scene as it acts from t (s) on, unless it is switched off by then."""
+    changes: dict[str, Any] = {}
+    if load.over_time is not None:
+        changes["factor"] = load.over_time.from_time(t)
+        if changes["factor"] is None:
+            return
+    if load.acts_on == "bodies":
+        ends = zip(load.bodies, load.points, strict=True)
+        changes["points"] = tuple(tuple(_carried(scene, state, *end).tolist()) for end in ends)
+    elif hasattr(load, "point"):
+        changes["point"] = tuple(_carried(scene, state, load.body, load.point).tolist())
+    elif isinstance(load, JointLoad) and hasattr(load, field := f"natural_{load.coordinate}"):
+        changes[field] = getattr(load, field) - float(moved[load.joint][int(load.coordinate != ANGLE)])
+    yield load.model_copy(update=changes)
+
+
+def _refuse_gap(scene: Scene, joint: Joint, t: float, state: State) -> None:
+    """Raise SceneError if the poses of a state do not obey a joint as the scene gives it."""
+    alone = scene.with_(joint=[_permanent(joint)], coupling=(), driver=(), load=())
+    rows = closure(alone, 0.0, state.position, state.orientation)[joint.name]
+    lengths = np.where(length_rows(alone)[joint.name], scene_length(alone), 1.0)
+    if (gap := float(np.abs(rows / lengths).max(initial=0.0))) > MISSED:
+        raise SceneError(
+            [f"{joint.name}: misses its given pose at t = {t:.6g} s by {gap:.3g} lengths or rad"]
+        )

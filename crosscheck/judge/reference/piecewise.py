@@ -1,0 +1,102 @@
+"""The reference motion of a scene whose joints and couplings come and go: one motion for each piece, by one
+formulation, and the judge's impacts between them.
+
+Each formulation runs through all pieces on its own, so that its errors at an event pass to its next piece.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from crosscheck.judge.arithmetic import Arithmetic, doubles
+from crosscheck.judge.constraints import joint_coordinates
+from crosscheck.judge.impacts import impact
+from crosscheck.judge.pieces import State, at_start, events, has_pieces, later
+from crosscheck.judge.reference.motion import Motion, Times
+from mbref.scene import JointLoad, Scene, SceneError
+
+Formulation = Callable[..., Motion]
+BETWEEN = 64  # samples of a piece between which turns of joints with loads are counted
+FIELDS = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
+
+
+def motion_by(
+    formulation: Formulation, scene: Scene, times: Times, arithmetic: Arithmetic, **options: Any
+) -> Motion:
+    """Return the motion of a scene at increasing times (k,) by a formulation, with the formulation's
+    options, also through the events of constraints with intervals."""
+    if not has_pieces(scene):
+        return formulation(scene, times, arithmetic, **options)
+    end, wanted, left = options.pop("seconds", np.inf), np.asarray(times, dtype=float), 0.0
+    piece, begin, moved, parts = at_start(scene), 0.0, _unmoved(scene), list[Motion]()
+    for stop in (*events(scene, float(wanted[-1])), None):
+        chosen = wanted[(wanted >= begin) & (wanted < (np.inf if stop is None else stop))]
+        own = np.unique([*chosen, *([] if stop is None else np.linspace(begin, stop, BETWEEN))]) - begin
+        began = time.thread_time()
+        found = formulation(piece, own, arithmetic, seconds=end - left, **options)
+        left += time.thread_time() - began
+        parts.append(_later(found, begin, chosen))
+        if stop is None or found.reason:
+            break
+        moved = _moved(piece, found, moved)
+        try:
+            piece = _after(scene, piece, stop, found, moved)
+        except SceneError as error:
+            parts[-1] = replace(parts[-1], reason=error.faults[0])
+            break
+        begin = stop
+    return _joined(parts)
+
+
+def _after(scene: Scene, piece: Scene, t: float, found: Motion, moved: dict[str, np.ndarray]) -> Scene:
+    """Return the piece that begins at t (s) with the velocities after the impact at the end of a motion."""
+    before = State(*(doubles(getattr(found, key)[-1]) for key in State._fields))
+    after = later(scene, piece, t, before, moved)
+    return later(scene, piece, t, impact(after, before).state, moved)
+
+
+def _unmoved(scene: Scene) -> dict[str, np.ndarray]:
+    """Return zero angle and displacement (2,) of the joints with loads."""
+    return {load.joint: np.zeros(2) for load in scene.load if isinstance(load, JointLoad)}
+
+
+def _moved(piece: Scene, found: Motion, before: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return angle (rad) and displacement (m) (2,) at the end of a piece, since t = 0, of joints with
+    loads."""
+    if not before:
+        return before
+    place, turn, spin = map(doubles, (found.position, found.orientation, found.angular_velocity))
+    coordinates = joint_coordinates(piece, found.times, place, turn, spin)
+    return {name: total + coordinates[name][-1] for name, total in before.items()}
+
+
+def _later(found: Motion, begin: float, times: np.ndarray) -> Motion:
+    """Return the samples of a piece that begins at a time (s), at the reached times (k,) since t = 0."""
+    shown = np.isin(found.times, times - begin)
+    return replace(
+        found,
+        times=times[: int(shown.sum())],
+        **{key: getattr(found, key)[shown] for key in FIELDS},
+        reached=begin + found.reached,
+        crossings=tuple(begin + t for t in found.crossings),
+    )
+
+
+def _joined(parts: list[Motion]) -> Motion:
+    """Return consecutive parts as one motion."""
+    arrays: dict[str, Any] = {
+        key: np.concatenate([getattr(part, key) for part in parts]) for key in ("times", *FIELDS)
+    }
+    return replace(
+        parts[-1],
+        **arrays,
+        steps=sum(part.steps for part in parts),
+        crossings=tuple(t for part in parts for t in part.crossings),
+        seconds=sum(part.seconds for part in parts),
+        contradiction=max(part.contradiction for part in parts),
+    )
