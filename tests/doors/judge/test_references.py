@@ -109,30 +109,6 @@ def test_states_of_a_reference_do_not_depend_on_other_samples(name):
     assert turned_between(found.orientation[chosen], np.array(exact["orientation"])).max() <= bound
 
 
-@pytest.mark.parametrize("name", a_few(SMOOTH, 6, 1))
-def test_jacobian_times_velocities_is_the_difference_of_joint_residuals(name):
-    """The difference is of order 4: residuals at ±h and ±2h, h = 1e-4 s, of poses that move from the start at
-    random velocities v: G v - (rates of drivers). Rounding over h is 1e-12, the error of the difference h⁴
-    times fifth derivatives, together below 1e-8."""
-    scene = MOTIONS[name]()
-    place, turn = constraints.initial_poses(scene)
-    rows, rates = constraints.jacobian(scene, 0.0, place, turn)
-    h, size = 1e-4, len(scene.body)
-    names = [joint.name for joint in scene.joint]
-    twist = np.random.default_rng(len(name)).normal(size=(size, 6))
-
-    def residuals(sign: float) -> np.ndarray:
-        step = sign * h * twist
-        moved = rotations.multiply(rotations.from_vector(step[:, 3:]), turn)
-        found = constraints.closure(scene, sign * h, place + step[:, :3], moved)
-        return np.concatenate([np.zeros(0), *(found[joint] for joint in names)])
-
-    slope = (8 * (residuals(1.0) - residuals(-1.0)) - residuals(2.0) + residuals(-2.0)) / (12 * h)
-    count = len(slope)  # rows of couplings follow
-    wanted = (rows @ twist.ravel() - rates)[:count]
-    assert slope == pytest.approx(wanted, abs=1e-8)
-
-
 @pytest.mark.parametrize("name", MOTIONS)
 def test_length_of_a_mechanism_is_in_its_units_and_independent_of_frame_and_order(name):
     """In units seven times smaller it has seven times the number."""

@@ -14,7 +14,7 @@ from crosscheck.judge.energy import energy_series, kinetic_energy, potential_ene
 from crosscheck.judge.metrics import METRICS
 from crosscheck.judge.model_identity import acceleration_scale, along, gate, gate_times
 from crosscheck.judge.momentum import momentum_series
-from crosscheck.judge.precision import grain, single_precision
+from crosscheck.judge.precision import grain
 from crosscheck.judge.reaction_balance import absurd, balance, with_exact_reactions
 from crosscheck.judge.truth import Truth
 from mbref import rotations
@@ -324,14 +324,6 @@ def test_noise_of_positions_is_measured_within_a_factor_of_six(size):
     noise = size * np.random.default_rng(3).standard_normal(run.position.shape)
     found, of = grain(scene, replace(run, position=run.position + noise))
     assert of == "positions" and size / 6 < found * scene_length(scene) < 6 * size
-
-
-def test_velocities_in_single_precision_are_named_and_no_quantity_in_double_precision():
-    """Velocities are rounded to numpy's float32; the true motion is in doubles."""
-    scene, run = double_hinge(), neighbouring_samples()
-    assert not single_precision(scene, run)
-    single = replace(run, velocity=run.velocity.astype(np.float32).astype(float))
-    assert {item.partition(" of ")[0] for item in single_precision(scene, single)} == {"velocity"}
 
 
 # --- scales -----------------------------------------------------------------------------------------------
