@@ -9,7 +9,7 @@ from crosscheck.closed_loops.mechanisms import DIFFICULTIES
 from crosscheck.conformance.mechanisms.closed_forms import screw
 from crosscheck.conformance.mechanisms.features import feature_scenes
 from crosscheck.engine import Owner, Setting, engine
-from crosscheck.engines.mujoco.ports import FAMILIES
+from crosscheck.engines.mujoco.ports import OWN_STEPS
 from crosscheck.findings.finding import FOLDER
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.metrics import error_series
@@ -49,7 +49,7 @@ def test_warp_sweeps_the_finest_step_only_with_loops_or_couplings() -> None:
     """In single precision the rounding of a tree's motion grows with the number of steps. MJX, in double
     precision, sweeps the finest step of every scene; a heavy top has neither loops nor couplings."""
     for scene, omitted in ((SCENES["heavy_top"](), 1), (SCENES["bennett"](), 0), (screw()[0], 0)):
-        for family in FAMILIES:
+        for family in OWN_STEPS:
             of_mjx, of_warp = (
                 [s.options["step"] for s in engine(n).settings(scene) if s.family == family] for n in MODULES
             )
