@@ -52,7 +52,7 @@ class Rows(NamedTuple):
 
 def parts(rows: np.ndarray) -> Iterator[Part]:
     """Return the parts of a mechanism whose Jacobian (m, 6 nb) is ``rows``: bodies that rows connect."""
-    touched = np.abs(rows).reshape(len(rows), -1, 6).max(axis=2) > 0
+    touched = np.abs(rows).reshape(len(rows), rows.shape[1] // 6, 6).max(axis=2) > 0
     count, label = connected_components(csr_array(touched.T.astype(float) @ touched), directed=False)
     of_row = label[touched.argmax(axis=1)]
     for k in range(count):
@@ -87,7 +87,7 @@ def least_constraint(scene: Scene) -> np.ndarray:
     inverses[:, 3:, 3:] = np.linalg.inv(np.swapaxes(np.linalg.cholesky(inertia), 1, 2))
     free = np.einsum("bji,bj->bi", inverses, unbound(scene)[1].reshape(-1, 6)).ravel()
     rows = jacobian(scene, 0.0, *pose)[0]
-    weighted = np.einsum("rbi,bij->rbj", rows.reshape(len(rows), -1, 6), inverses).reshape(rows.shape)
+    weighted = np.einsum("rbi,bij->rbj", rows.reshape(len(rows), len(turn), 6), inverses).reshape(rows.shape)
     wanted = -bias(scene) - weighted @ free
     for part in parts(rows):
         held = factored(weighted[np.ix_(part.rows, part.columns)])

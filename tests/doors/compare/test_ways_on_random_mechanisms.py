@@ -1,0 +1,62 @@
+"""Alternatives of engines on random mechanisms: differences of ways, their causes, and the stored records."""
+
+import pytest
+
+from crosscheck.alternatives.records import FEWEST, SHARED, compared, mechanism, read
+from crosscheck.alternatives.table import UNKNOWN, above, causes, engines
+from crosscheck.cli.commands import main
+from crosscheck.conformance.mechanisms.large_graphs import MOST
+from crosscheck.conformance.runners import InProcess
+from crosscheck.engine import Alternatives, Setting
+from crosscheck.findings.finding import findings
+from mbref.records import rewrite
+from tests.helpers.falling_engine import ENGINE, STONE
+
+FACTORS = {"right": 1.0, "heavy": 1.5, "also right": 1.0}  # of gravity, by the name of a way
+
+
+def falls() -> dict:
+    """Return the comparison of ways in which a stone falls with its weight, or with one and a half of it."""
+    ways = {name: Setting("plain", {"factor": factor}) for name, factor in FACTORS.items()}
+    return compared(InProcess(ENGINE), STONE, Alternatives(ways, 1e-3))
+
+
+def test_differences_of_ways_are_relative_to_the_larger_acceleration_and_gauss_names_the_wrong_way():
+    """Accelerations g and 1.5 g differ by a third of the larger one; Gauss's principle gives g."""
+    found = falls()
+    sizes = {(first, second): size for first, second, size, *_ in found["pairs"]}
+    assert sizes == {
+        ("right", "heavy"): pytest.approx(1 / 3, rel=2e-3),
+        ("right", "also right"): 0.0,  # equal numbers
+        ("heavy", "also right"): pytest.approx(1 / 3, rel=2e-3),
+    }
+    right = pytest.approx(0.0, abs=1e-14)  # 50 roundings
+    assert found["off"] == {"right": right, "heavy": pytest.approx(0.5, rel=2e-3), "also right": right}
+    assert found["ended"] == dict.fromkeys(FACTORS, "")
+
+
+def test_command_names_pairs_above_their_limit_whose_cause_is_not_listed(tmp_path, capsys):
+    record = {
+        "key": "stone 0", "engine": "stone", "version": "1.0", "seed": 0, "scene": STONE.name, "bodies": 1,
+        "clearance": 1.0, "redundant": 0, "refused": "", "groups": [falls()],
+    }  # fmt: skip
+    rewrite(path := tmp_path / "records.jsonl", [record])
+    assert main(["alternatives", "--records", str(path)]) == 0
+    shown = capsys.readouterr().out
+    assert f"stone, right – heavy: up to 3e-01 on {STONE.name}: {UNKNOWN}" in shown
+    assert f"stone, heavy – also right: up to 3e-01 on {STONE.name}: {UNKNOWN}" in shown
+    assert "right – also right" not in shown
+
+
+@pytest.mark.parametrize("number", [0, 3, pytest.param(9, marks=pytest.mark.slow)])
+def test_every_tenth_mechanism_is_large(number):
+    """Mechanisms 9, 19, 29 … have 61 to 200 bodies, all others 5 to 60."""
+    fewest, most = (SHARED + 1, MOST) if number == 9 else (FEWEST, SHARED)
+    assert fewest <= len(mechanism(number).body) <= most
+
+
+def test_each_difference_above_a_limit_in_the_stored_records_has_a_cause():
+    """Findings that causes name exist, and each listed cause is needed."""
+    shown = {each.cause for each in above(engines(read()))}
+    assert shown == set(causes())
+    assert {cause.finding for cause in causes()} - {""} <= {finding.name for finding in findings()}
