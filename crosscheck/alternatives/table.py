@@ -66,6 +66,14 @@ class Pair(NamedTuple):
         return next(listed, Cause(self.engine, " – ".join(self.ways), UNKNOWN))
 
 
+class Completed(NamedTuple):
+    """Completed runs of a way: CPU times (s), and distances from Gauss's principle at the start, if the
+    engine gives accelerations."""
+
+    seconds: list[float]
+    off: list[float]
+
+
 class Above(NamedTuple):
     """A cause, and the pairs of ways that differ by it above their limit."""
 
@@ -117,13 +125,17 @@ def above(found: Mapping[str, Sequence[Record]]) -> list[Above]:
     return [Above(cause, of_cause) for cause, of_cause in by_cause.items()]
 
 
-def off(records: Sequence[Record]) -> dict[str, list[float]]:
-    """Return the distances from Gauss's principle of each way, in descending order."""
-    found: dict[str, list[float]] = {}
+def ways(records: Sequence[Record]) -> dict[str, Completed]:
+    """Return the completed runs of each way."""
+    found: dict[str, Completed] = {}
     for group in (group for record in records for group in record["groups"]):
-        for way, size in group["off"].items():
-            found.setdefault(way, []).append(size)
-    return {way: sorted(sizes, reverse=True) for way, sizes in found.items()}
+        for way, end in group["ended"].items():
+            if not end:
+                of_way = found.setdefault(way, Completed([], []))
+                of_way.seconds.append(group["seconds"][way])
+                if way in group["off"]:
+                    of_way.off.append(group["off"][way])
+    return found
 
 
 def ends(records: Sequence[Record]) -> Iterator[tuple[str, str, int]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from statistics import fmean, median
 
 from crosscheck.alternatives import table
 from crosscheck.alternatives.records import EVERY, FILE, GRAPHS, TIME_LIMIT, Record, read
@@ -11,6 +12,7 @@ from crosscheck.alternatives.records import EVERY, FILE, GRAPHS, TIME_LIMIT, Rec
 from ..blocks import Fold, Marked, Parts, Table, Within
 
 ABOVE = ("engine", "way", "pairs", "mechanisms", "worst", "in", "of", "limit", "cause")
+WAYS = ("way", "mechanisms", "mean CPU time, s", "median distance", "worst distance")
 PAIRS = ("pair of ways", "mechanisms", "median", "worst", "in", "of", "limit", "above")
 
 
@@ -60,12 +62,17 @@ def _above(row: table.Above) -> tuple[str, ...]:
     )
 
 
+def _way(name: str, of_way: table.Completed) -> tuple[str, ...]:
+    off = (f"{median(of_way.off):.0e}", f"{max(of_way.off):.0e}") if of_way.off else ("", "")
+    return name, str(len(of_way.seconds)), f"{fmean(of_way.seconds):.1g}", *off
+
+
 def _engine(name: str, own: Sequence[Record]) -> Fold:
-    off = [(way, str(len(s)), f"{s[len(s) // 2]:.0e}", f"{s[0]:.0e}") for way, s in table.off(own).items()]
+    ways = [_way(name, of_way) for name, of_way in table.ways(own).items()]
     ends = [(way, outcome, str(count)) for way, outcome, count in table.ends(own)]
     blocks = [
         Table("Largest relative difference of two ways.", PAIRS, [_pair(pair) for pair in table.pairs(own)]),
-        Table("Distance from Gauss's principle at the start.", ("way", "mechanisms", "median", "worst"), off),
+        Table("Ways, and their distance from Gauss's principle at the start.", WAYS, ways),
         Table("Ways that end early.", ("way", "outcome", "mechanisms"), ends),
     ]
     return Fold(f"{name} {own[0]['version']}", name, [block for block in blocks if block.rows])
