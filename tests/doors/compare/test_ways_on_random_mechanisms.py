@@ -37,9 +37,17 @@ def test_differences_of_ways_are_relative_to_the_larger_acceleration_and_gauss_n
 
 def test_command_names_pairs_above_their_limit_whose_cause_is_not_listed(tmp_path, capsys):
     record = {
-        "key": "stone 0", "engine": "stone", "version": "1.0", "seed": 0, "scene": STONE.name, "bodies": 1,
-        "clearance": 1.0, "redundant": 0, "refused": "", "groups": [falls()],
-    }  # fmt: skip
+        "key": "stone 0",
+        "engine": "stone",
+        "version": "1.0",
+        "seed": 0,
+        "scene": STONE.name,
+        "bodies": 1,
+        "clearance": 1.0,
+        "redundant": 0,
+        "refused": "",
+        "groups": [falls()],
+    }
     rewrite(path := tmp_path / "records.jsonl", [record])
     assert main(["alternatives", "--records", str(path)]) == 0
     shown = capsys.readouterr().out
