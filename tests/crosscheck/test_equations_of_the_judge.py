@@ -8,10 +8,9 @@ from scipy.interpolate import CubicSpline
 
 from crosscheck.judge import joint_coordinates, time_functions
 from crosscheck.judge.equations_of_motion import accelerations as of_terms
-from crosscheck.judge.equations_of_motion import scaled_terms, terms_at, variants
+from crosscheck.judge.equations_of_motion import terms_at
 from crosscheck.judge.gauss_motion import accelerations, gauss_motion
 from crosscheck.judge.joint_residuals import joint_frames, position_rows, with_ground
-from mbref import rotations
 from mbref.scene import Body, Driver, Fixed, Force, Moment, Revolute, Scene, TorsionSpring
 from tests.helpers.parts import X, Y, Z, joint
 
@@ -170,33 +169,6 @@ def test_terms_of_a_pendulum_are_its_forces_mass_and_constraint_rows():
     assert later.forces["load[1] (torsion_spring at 'J')"][5] == pytest.approx(-3.0 * (angle - 0.1))
     direct = np.hstack([motion.acceleration[1, 0], motion.angular_acceleration[1, 0]])
     assert of_terms(scene, later) == pytest.approx(direct, abs=1e-9)  # m/s², rad/s²
-
-
-def test_scaled_terms_are_multiples_of_one_force_part_of_gamma_or_inertia():
-    """A driven pendulum of 2 kg on the ground: gravity is −18 N, the driver accelerates by 6 rad/s²."""
-    scene = pendulum().with_(driver=(Driver(joint="J", polynomial=(0.0, 2.0, 3.0)),))
-    motion = gauss_motion(scene, (0.0, 0.05))
-    terms = terms_at(scene, motion, 0)
-    halved = {scaled.name: scaled.times(0.5) for scaled in scaled_terms(scene, motion, 0)}
-    assert halved["gravity"].forces["gravity"][1] == pytest.approx(-9.0)
-    assert halved["gravity"].forces["load[0] (force on 'b')"][1] == 1.5
-    gamma = halved["the velocity part of γ in J a = γ"]
-    assert gamma.of_velocities == pytest.approx(terms.of_velocities / 2)
-    assert halved["the drivers' accelerations in γ"].of_drivers == pytest.approx([0, 0, 0, 0, 0, 3.0])
-    lighter = halved["the mass of body 'b'"]
-    assert np.diag(lighter.mass)[:3] == pytest.approx([1.0] * 3)
-    assert lighter.forces["gravity"][1] == pytest.approx(-9.0)
-
-
-def test_variants_of_the_mass_matrix_take_the_inertia_about_wrong_axes():
-    """Body inertia J and rotation Q: J, Qᵀ J Q, and Q D Qᵀ with the diagonal D of J."""
-    scene = pendulum()
-    motion = gauss_motion(scene, (0.0, 0.05))
-    turned = list(variants(scene, motion, 1))
-    own = np.array(scene.body[0].inertia)
-    q = rotations.to_matrix(motion.orientation[1, 0])
-    for variant, inertia in zip(turned, (own, q.T @ own @ q, q @ np.diag(np.diag(own)) @ q.T), strict=False):
-        assert variant.terms.mass[3:, 3:] == pytest.approx(inertia, abs=1e-14), variant.change
 
 
 def test_a_massless_link_does_not_change_the_acceleration_of_a_pendulum():

@@ -63,12 +63,6 @@ def test_diagnosis_counts_the_rows_that_share_a_redundant_force():
     assert found.unique_reactions == ()
 
 
-def test_diagnosis_of_the_spatial_slider_crank_has_no_redundant_row_and_unique_reactions_everywhere():
-    """The paper states 23 rows for 24 coordinates and one degree of freedom, all independent."""
-    found = diagnose(SCENES["spatial_slider_crank"]())
-    assert (found.redundant_by_joint, found.unique_reactions) == ({}, ("A", "B", "C", "D"))
-
-
 def test_smallest_singular_value_is_proportional_to_the_angle_from_the_flat_pose():
     """The loop's gap closes by sin θ to first order, so that a tenth of the angle (rad) gives a tenth of the
     value; 1 rad is large, sin 1 = 0.84, so that 20 % are allowed."""

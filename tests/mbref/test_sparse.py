@@ -11,8 +11,7 @@ from crosscheck.judge.truth import truth_for
 from mbref.equations import initial_state
 from mbref.equations.active_coordinates import active_entries
 from mbref.equations.model import Model
-from mbref.kernels.layout import Ends
-from mbref.kernels.named_memory import allocate, packed
+from mbref.kernels.named_memory import packed
 from mbref.linear_algebra.redundancy import Redundancy
 from mbref.linear_algebra.sparse_cholesky import (
     assemble_gradients,
@@ -23,7 +22,6 @@ from mbref.linear_algebra.sparse_cholesky import (
     subtract_product,
     times_transpose,
 )
-from mbref.linear_algebra.sparse_lu import factorise_product
 from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
 from mbref.scenes import find_scene
 from mbref.simulation.simulate import Limits, simulate
@@ -72,36 +70,6 @@ def test_sparse_factor_solves_and_multiplies_as_dense_matrices(bodies, rows, see
     find_squared_pivots(memory)
     seen = np.sqrt(np.sort(factor.squared_pivots))
     assert np.abs(seen - pivots).max(initial=0) < 1e-6 / np.sqrt(alpha), f"pivots {seen}, dense {pivots}"
-
-
-@given(bodies=st.integers(1, 8), rows=st.integers(1, 20), seed=st.integers(0, 999))
-def test_pivots_of_a_product_of_gradients_give_dense_determinants(bodies, rows, seed):
-    """The product of the first k pivots times the squares of the rows of D₀ is the determinant of the first k
-    rows and columns of D₀ D₁ᵀ + diag(D₀ D₀ᵀ) / 1000; the logarithm to 1e-6, as minors may be nearly
-    singular."""
-    rng, n = np.random.default_rng(seed), 6 * bodies
-    columns = 6 * rng.integers(0, bodies, rows)[:, None] + np.arange(6)
-    entries = rng.random((rows, 6)) < 0.7
-    row, entry = np.nonzero(entries)
-    moving = np.isin(np.arange(n), columns[entries])
-    factor = sparse_factor(symbolic_factorisation(row, columns[row, entry], 6 * row + entry, moving))
-    here, there = rng.normal(size=(2, factor.d.size))
-    factor.d[:] = here
-    size = factor.symbolic.row.size
-    sizes = {"watched_rows": size, "watched_entries": factor.d.size, "watched_numbers": factor.l.size}
-    product = packed(allocate(Ends, {**sizes, "nb": bodies}))
-    factorise_product(packed(factor).argument, there, 1e3, product.argument)
-    dense = np.zeros((2, size, factor.symbolic.column.size))
-    for k in range(size):
-        own = slice(factor.symbolic.d_start[k], factor.symbolic.d_start[k + 1])
-        dense[:, k, factor.symbolic.d_column[own]] = here[own], there[own]
-    squares = (dense[0] ** 2).sum(axis=1)
-    matrix = dense[0] @ dense[1].T + np.diag(squares) / 1e3
-    for k in range(1, size + 1):
-        signs, sizes = np.linalg.slogdet(matrix[:k, :k])
-        found = product.values.pivots[:k] * squares[:k]
-        assert np.prod(np.sign(found)) == signs
-        assert np.abs(np.log(np.abs(found)).sum() - sizes) < 1e-6
 
 
 @pytest.mark.parametrize(
