@@ -1,36 +1,10 @@
-"""Angles of joints at a pose, counted over full turns from pose to pose."""
+"""Angles of joints of a model, and the loads that need them."""
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator
-
 import numpy as np
 
-from mbref.equations.joint_angles import angles_of_pose
 from mbref.equations.model import Model
-
-
-def angles_at(model: Model, q: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Return the angles (k,), rad, of turning joints at q (7 nb,), each nearest to its value ``before``.
-
-    The values ``before`` are returned if no spring and no coupling needs an angle.
-    """
-    if not model.has_angles:
-        return before
-    angles = angles_of_pose(model, q)
-    return np.asarray(angles + 2 * np.pi * np.round((before - angles) / (2 * np.pi)))
-
-
-@contextlib.contextmanager
-def counted_from(model: Model, angles: np.ndarray) -> Iterator[None]:
-    """Evaluate the model's terms with angles nearest to the given ones (k,)."""
-    reference = model.memory.values.angles
-    reference[:] = angles
-    try:
-        yield
-    finally:
-        reference[:] = 0.0
 
 
 def slots(model: Model) -> int:

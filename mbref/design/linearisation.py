@@ -16,9 +16,9 @@ from collections.abc import Callable
 import numpy as np
 
 from mbref.design.allowed_motions import TANGENT_RANK, ConstraintRows, by_gauss
-from mbref.design.joint_angles import angles_at, counted_from
 from mbref.design.turning import TURNED_BY, UNCHANGED, Turning
 from mbref.equations.gaps import gaps
+from mbref.equations.joint_angles import angles_at, counted_from
 from mbref.equations.model import Model, displaced, displacement
 from mbref.equations.units import row_lengths
 from mbref.scene import SceneError

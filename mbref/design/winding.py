@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from mbref.design.balance import ONE_POSE, STRIDE
-from mbref.design.joint_angles import angles_at, sprung
+from mbref.design.joint_angles import sprung
 from mbref.design.linearisation import Tangent
+from mbref.equations.joint_angles import angles_at
 from mbref.equations.model import displaced
 
 STRIDES = 2000  # largest number of strides towards the natural angles, about 100 turns

@@ -6,11 +6,13 @@ others.  Then the poses of the other rows decide whether the motion of this driv
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from mbref.equations.gaps import lengths_of_rows
+from mbref.equations.joint_angles import angles_at, counted_from
 from mbref.equations.model import Model, Terms, displaced
 from mbref.equations.units import unit_equations, unit_rows
 from mbref.linear_algebra.least_norm import least_norm
@@ -31,6 +33,8 @@ RATE_CONFLICT = 5e-11  # difference of rates over the largest rate of a driver t
 RATE_SHARE = 2e-10  # the same over 1/duration: tables of 13 digits differ by less
 MOST_DRIVER_ROWS = 300  # constraint rows; of larger mechanisms singular values take too long
 POSE_STEPS = 20  # largest number of Newton steps to a pose
+LARGEST_TURN = 1.0  # rad of a body at a time; two bodies then turn by less than half a turn to each other
+MOST_PARTS = 100  # largest number of parts of a Newton step
 LAST_MOVE = 1e-15  # change of a pose by the last Newton step, lengths of the mechanism or rad
 
 
@@ -79,6 +83,13 @@ def refuse_conflict(scene: Scene, until: float | None = None) -> None:
         raise SceneError([found.fault])
 
 
+class _Pose(NamedTuple):
+    """Coordinates q (7 nb,) and angles (k,), rad, of turning joints with their full turns."""
+
+    q: np.ndarray
+    angles: np.ndarray
+
+
 class _Limits(NamedTuple):
     """Differences of motions (lengths of the mechanism or rad) and of rates (over s) that are rounding."""
 
@@ -88,9 +99,10 @@ class _Limits(NamedTuple):
 
 def _first_conflict(model: Model, until: float) -> Conflict | None:
     times, limits = _compared(model, until)
-    q, every, drivers = model.start(), np.arange(model.m), _driver_rows(model)
+    pose = _Pose(model.start(), np.zeros(model.memory.values.angles.size))
+    every, drivers = np.arange(model.m), _driver_rows(model)
     for k, time in enumerate(times.tolist()):
-        before, (q, terms) = q, _posed(model, time, q, every)
+        before, (pose, terms) = pose, _posed(model, time, pose, every)
         gaps = np.abs(terms.phi) / lengths_of_rows(terms.blocks, model.length)
         if gaps.max(initial=0.0) > limits.gap:
             return _of_motions(model, time, before, drivers, limits)
@@ -136,16 +148,16 @@ def _driven_way(scene: Scene, length: float, times: np.ndarray) -> np.ndarray:
 
 
 def _of_motions(
-    model: Model, time: float, q: np.ndarray, drivers: dict[int, str], limits: _Limits
+    model: Model, time: float, pose: _Pose, drivers: dict[int, str], limits: _Limits
 ) -> Conflict | None:
     """Return the conflict of motions at a time (s); None if the other drivers come to a dead position.
 
-    The coordinates q (7 nb,) satisfy all rows a little earlier.
+    The pose satisfies all rows a little earlier.
     """
-    _, terms = _posed(model, time, q, np.arange(model.m))
+    _, terms = _posed(model, time, pose, np.arange(model.m))
     dropped = _dependent_drivers(model, terms, drivers)
     kept = np.setdiff1d(np.arange(model.m), list(dropped))
-    _, terms = _posed(model, time, q, kept)
+    _, terms = _posed(model, time, pose, kept)
     gaps = np.abs(terms.phi) / lengths_of_rows(terms.blocks, model.length)
     if not dropped or gaps[kept].max(initial=0.0) > limits.gap:
         return None
@@ -207,15 +219,30 @@ def _combination(rows: np.ndarray, row: np.ndarray) -> np.ndarray | None:
     return np.asarray(np.abs(weights) > DRIVER_WEIGHT)
 
 
-def _posed(model: Model, time: float, q: np.ndarray, kept: np.ndarray) -> tuple[np.ndarray, Terms]:
-    """Return the pose (7 nb,) nearest to q that satisfies the kept rows at a time (s), and its terms."""
-    terms = model.terms(time, q)
+def _posed(model: Model, time: float, pose: _Pose, kept: np.ndarray) -> tuple[_Pose, Terms]:
+    """Return the pose nearest to another one that satisfies the kept rows at a time (s), and its terms."""
+    terms = _terms(model, time, pose)
     for _ in range(POSE_STEPS):
         rows = terms.jacobian[kept] * model.units
         lengths = np.linalg.norm(rows, axis=1)
         step = least_norm(rows / lengths[:, None], -terms.phi[kept] / lengths, DEPENDENT_DRIVER)
-        q = displaced(q, model.units * step)
-        terms = model.terms(time, q)
+        pose = _moved(model, pose, model.units * step)
+        terms = _terms(model, time, pose)
         if np.abs(step).max(initial=0.0) < LAST_MOVE:
             break
-    return q, terms
+    return pose, terms
+
+
+def _terms(model: Model, time: float, pose: _Pose) -> Terms:
+    with counted_from(model, pose.angles):
+        return model.terms(time, pose.q)
+
+
+def _moved(model: Model, pose: _Pose, x: np.ndarray) -> _Pose:
+    """Return the pose after displacements x (n,), in parts over which angles are counted."""
+    turned = np.linalg.norm(x.reshape(-1, 6)[:, 3:], axis=1).max(initial=0.0)
+    count = max(1, min(math.ceil(turned / LARGEST_TURN), MOST_PARTS))
+    for _ in range(count):
+        q = displaced(pose.q, x / count)
+        pose = _Pose(q, angles_at(model, q, pose.angles))
+    return pose

@@ -1,6 +1,10 @@
-"""Angles of joints that turn about one axis, as columns by joint, and at one pose."""
+"""Angles of joints that turn about one axis: as columns by joint, at one pose, and counted from pose to
+pose."""
 
 from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -23,3 +27,25 @@ def angles_of_pose(model: Model, q: np.ndarray) -> np.ndarray:
     x, y = (rotations.rotate(p[turning.first], each) for each in (turning.x_first, turning.y_first))
     u = rotations.rotate(p[turning.second], turning.x_second)
     return np.asarray(np.arctan2((u * y).sum(axis=1), (u * x).sum(axis=1)))
+
+
+def angles_at(model: Model, q: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Return the angles (k,), rad, of turning joints at q (7 nb,), each nearest to its value ``before``.
+
+    The values ``before`` are returned if no spring and no coupling needs an angle.
+    """
+    if not model.has_angles:
+        return before
+    angles = angles_of_pose(model, q)
+    return np.asarray(angles + 2 * np.pi * np.round((before - angles) / (2 * np.pi)))
+
+
+@contextlib.contextmanager
+def counted_from(model: Model, angles: np.ndarray) -> Iterator[None]:
+    """Evaluate the model's terms with angles nearest to the given ones (k,)."""
+    reference = model.memory.values.angles
+    reference[:] = angles
+    try:
+        yield
+    finally:
+        reference[:] = 0.0

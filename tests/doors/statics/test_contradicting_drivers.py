@@ -7,7 +7,7 @@ from mbref import Limits, Scene, SceneError, equilibria, simulate
 from mbref.cli.commands import main
 from mbref.ensembles.simulate_all import simulate_all
 from tests.helpers.dead_positions import pushed, turned
-from tests.helpers.statics import parallelogram, rod, slide
+from tests.helpers.statics import hinge, parallelogram, rod, slide
 
 TIMES = np.array([0.5, 1.0])  # s, of scenes in a batch
 COMMANDS = {"run": 2, "diagnose": 0, "equilibrium": 2}  # and their exit status; diagnose only reports
@@ -93,6 +93,21 @@ def test_drivers_of_both_cranks_of_a_parallelogram_contradict_each_other_unless_
         simulate(scene.with_(driver=other), times=[1.0])
     with pytest.raises(SceneError, match="the drivers of A and D contradict each other"):
         equilibria(scene.with_(driver=other))
+
+
+def test_drivers_of_two_coupled_wheels_agree_over_many_turns_or_are_named():
+    """Wheel a turns by 10 t rad, b by -3.7 t, and a third one by 200 t: over half a turn between two compared
+    poses. Then b is driven 1e-6 t² rad further."""
+    bodies = [rod(name, (k + 0.3, 0.0, 0.0)) for k, name in enumerate("abc")]
+    joints = [hinge(name.upper(), ("ground", name), (k, 0.0, 0.0)) for k, name in enumerate("abc")]
+    gears = [{"name": f"A{n}", "joints": ["A", n], "ratio": r} for n, r in (("B", -0.37), ("C", 20.0))]
+    scene = Scene(name="gears", body=bodies, joint=joints, coupling=gears)
+    drivers = [{"joint": "A", "polynomial": [0.0, 10.0]}, {"joint": "B", "polynomial": [0.0, -3.7]}]
+    run = simulate(scene.with_(driver=drivers), times=[1.0])
+    assert [run.joint(name).angle[0] for name in "ABC"] == pytest.approx([10.0, -3.7, 200.0], rel=1e-12)
+    other = {"joint": "B", "polynomial": [0.0, -3.7, 1e-6]}
+    with pytest.raises(SceneError, match="the drivers of A and B contradict each other"):
+        simulate(scene.with_(driver=[drivers[0], other]), times=[1.0])
 
 
 @pytest.mark.parametrize("made", [lambda: turned(0.5, 0.4, 0.3, 4.0), lambda: pushed(0.2, 0.5, 1.0, 0.7)])
