@@ -2,8 +2,8 @@
 again.
 
 A line is strict JSON (NaN becomes null, an infinite number 1e999), written by one call of the operating
-system. So a kill or a power failure can leave only the last line incomplete. An incomplete last line is
-removed when the file is read. Files that are complete may be compressed (xz), to be read only.
+system. So a kill or a power failure can leave only the last line incomplete. It is then reported, and removed
+before a record is added. Files that are complete may be compressed (xz), to be read only.
 """
 
 from __future__ import annotations
@@ -42,6 +42,9 @@ def stored(path: str | Path | None) -> dict[str, dict[str, Any]]:
     records, whole = _parsed(path, text)
     if path is not None and whole < len(text):
         os.truncate(path, whole)
+    elif path is not None and text and not text.endswith(b"\n"):
+        with open(path, "ab") as file:
+            file.write(b"\n")
     return records
 
 
@@ -67,8 +70,13 @@ def _decompressed(path: str | Path | None, text: bytes) -> bytes:
 
 
 def _parsed(path: str | Path | None, text: bytes) -> tuple[dict[str, dict[str, Any]], int]:
-    """Return the records of a file's text by ``key``, and the size of its complete lines (bytes)."""
+    """Return the records of a file's text by ``key``, and the size of its complete lines (bytes).
+
+    The last line may lack its end.
+    """
     end = text.rfind(b"\n") + 1
+    if _record(text[end:]) is not None:
+        end = len(text)
     lines = [_record(line) for line in text[:end].splitlines()]
     foreign = [number for number, record in enumerate(lines, 1) if record is None]
     if text and len(foreign) == len(lines):
@@ -76,6 +84,8 @@ def _parsed(path: str | Path | None, text: bytes) -> tuple[dict[str, dict[str, A
     if foreign:
         numbers = ", ".join(map(str, foreign))
         print(f"{path}: line {numbers} holds no record and was left unchanged", file=sys.stderr)
+    if end < len(text):
+        print(f"{path}: the last line is incomplete and was left out", file=sys.stderr)
     return {record["key"]: record for record in lines if record is not None}, end
 
 

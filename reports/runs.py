@@ -115,11 +115,14 @@ class Run:
 
     @cached_property
     def trajectory(self) -> Trajectory:
+        record = f"records.jsonl: record {self.record['key'][:12]!r}"
         for field in ("bodies", "reactions"):
             if self.record.get(field) is None:
-                key = self.record["key"][:12]
-                raise RecordsError(f"records.jsonl: record {key!r}: {field}: field required by pictures")
-        return Trajectory.from_record(self.scene, self.record)
+                raise RecordsError(f"{record}: {field}: field required by pictures")
+        motion = Trajectory.from_record(self.scene, self.record)
+        if len(motion.position) != len(motion.times) or not self.record["bodies"]:
+            raise RecordsError(f"{record}: bodies: pictures require states of all bodies at all times")
+        return motion
 
 
 @dataclass(frozen=True)

@@ -45,8 +45,10 @@ def closed_loops(arguments: argparse.Namespace) -> int:
     if status := write_page("closed-loops", path, arguments.page):
         return status
     found = read_runs(path)
+    cells = matrix(found)
     for is_best in (True, False):
-        console().print(_errors(matrix(found), is_best))
+        console().print(_errors(cells, is_best))
+    _name_left_out(found, [r for row in cells.values() for cell in row.values() for r in cell.records])
     _legend(console())
     return COMPLETED
 
@@ -86,14 +88,20 @@ def convergence(arguments: argparse.Namespace) -> int:
             ladders.measure(engines, path, notice)
     if status := write_page("convergence", path, arguments.page):
         return status
-    console().print(_of_scenes() if arguments.every_scene else _orders(read_runs(path)))
+    if arguments.every_scene:
+        console().print(_of_scenes())
+        return COMPLETED
+    runs = read_runs(path)
+    rows = orders.table(runs)
+    console().print(_orders(rows))
+    _name_left_out(runs, [r for row in rows.values() for cell in row.values() for r in cell])
     return COMPLETED
 
 
-def _orders(runs: Sequence[Record]) -> Table:
+def _orders(rows: orders.Table) -> Table:
     headings = [mechanism.heading for mechanism in ladders.MECHANISMS]
     table = Table("engine, family", *headings, title="least errors, and orders in parentheses", box=SIMPLE)
-    for row, found in orders.table(runs).items():
+    for row, found in rows.items():
         table.add_row(row.name, *map(orders.cell, found.values()))
     return table
 
@@ -107,6 +115,14 @@ def _of_scenes() -> Table:
     return table
 
 
+def _name_left_out(records: Sequence[Record], shown: Sequence[Record]) -> None:
+    """Print which records belong to no row and column of a table."""
+    keys = {record["key"] for record in shown}
+    if left := [record["key"] for record in records if record["key"] not in keys]:
+        more = f" and {len(left) - 1} more" * (len(left) > 1)
+        notice(f"no row and column of the table has record {left[0][:40]!r}{more}")
+
+
 def invariants(arguments: argparse.Namespace) -> int:
     """Measure engines and write the page if requested, and print the tables of invariants and laws."""
     path = Path(arguments.records)
@@ -114,7 +130,10 @@ def invariants(arguments: argparse.Namespace) -> int:
         kept.measure(request.find_engines(arguments.engine or ["all"], notice), path, notice)
     if status := write_page("invariants", path, arguments.page):
         return status
-    for title, found in laws.tables(kept.read(path)).items():
+    runs = kept.read(path)
+    known = {column.experiment for column in laws.COLUMNS}
+    _name_left_out(runs, [record for record in runs if record["experiment"] in known])
+    for title, found in laws.tables(runs).items():
         table = Table("row", *(column.heading for column in laws.COLUMNS), title=title, box=SIMPLE)
         for name, row in found.items():
             table.add_row(name, *(laws.cell(row, column) for column in laws.COLUMNS))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ConfigDict, model_validator
 
 from crosscheck.engine import Cannot, Engine, Owner, Setting, engine
 from crosscheck.invariants.experiments import EXPERIMENTS, Experiment, times_of
@@ -50,7 +50,10 @@ OTHERS = (
 
 
 class Shape(BaseModel):
-    """Record of a run, or of the refusal of a mechanism; ``values`` are empty unless the run completed."""
+    """Record of a run, or of the refusal of a mechanism, which has neither ``x`` nor ``values``; they are
+    empty unless the run completed."""
+
+    model_config = ConfigDict(strict=True)
 
     key: str
     row: str
@@ -64,6 +67,14 @@ class Shape(BaseModel):
     options: dict[str, Any] = {}
     values: dict[str, float | None] = {}
     seconds: float = 0.0
+
+    @model_validator(mode="after")
+    def _is_of_a_row_and_a_run(self) -> Shape:
+        if not self.row.startswith(f"{self.engine}, "):
+            raise ValueError(f"row must begin with the engine, {self.engine!r}")
+        if self.outcome != REFUSED and not {"x", "values"} <= self.model_fields_set:
+            raise ValueError("x and values are required of a run")
+        return self
 
 
 def read(path: Path = FILE) -> list[Record]:

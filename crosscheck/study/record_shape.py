@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, model_validator
 
+from crosscheck.setting import TOLERANCES
 from mbref.motions.trajectory import Outcome
 from mbref.records import RecordsError
 
@@ -58,9 +60,17 @@ class _Shape(BaseModel):
     model_config = ConfigDict(strict=True)
 
 
+def _sizes(options: dict[str, Any]) -> dict[str, Any]:
+    """Return the options; raises ValueError for a step or tolerance that is no positive number."""
+    for name in ("step", *TOLERANCES):
+        if type(size := options.get(name, 1.0)) not in (int, float) or not 0.0 < size < math.inf:
+            raise ValueError(f"{name}: must be a positive number")
+    return options
+
+
 class _Asked(_Shape):
     engine: str
-    options: dict[str, Any]
+    options: Annotated[dict[str, Any], AfterValidator(_sizes)]
     end: float | None = None
     samples: int | None = None
     times: list[float] | None = None
@@ -70,7 +80,7 @@ class Cost(_Shape):
     """Cost of a run, as tables read it: CPU time (s) and number of steps."""
 
     seconds: float
-    steps: int = 0
+    steps: int
 
 
 class _Crossing(_Shape):
@@ -95,7 +105,6 @@ class _Body(_Shape):
 class _WholeCost(Cost):
     model_config = ConfigDict(strict=True, extra="forbid")
     build_seconds: float
-    steps: int
     rejected: int = 0
     rhs: int = 0
     factorisations: int = 0
@@ -121,18 +130,22 @@ class Ladder(_Shape):
     date: str | None = None
 
 
-class Refused(_Shape):
-    """Record of an engine that cannot run a scene, as tables of stored runs keep it."""
-
+class _Stored(_Shape):
     key: str
     scene: str
     engine: str
     version: str | None
-    outcome: str
     message: str
 
 
-class Measured(Refused):
+class Refused(_Stored):
+    """Record of an engine that cannot run a scene, as tables of stored runs keep it."""
+
+    outcome: Literal["REFUSED"]
+    owner: str
+
+
+class Measured(_Stored):
     """Record of a run without its motion, as tables of stored runs keep it."""
 
     family: str

@@ -14,7 +14,6 @@ from pydantic import BaseModel
 from crosscheck.engine import Cannot, engine
 from crosscheck.study.provenance import made_by
 from crosscheck.study.record_shape import Cost, Measured, Record, Refused, Run, checked
-from mbref.motions.trajectory import Outcome
 from mbref.records import RecordsError, looked_at, strict_json
 from mbref.scene import Scene, SceneError
 
@@ -51,7 +50,7 @@ def read_runs(path: Path) -> list[Record]:
     """
     found = list(looked_at(path).values())
     for record in found:
-        checked(path, [record], Measured if record.get("outcome") in Outcome.__members__ else Refused)
+        checked(path, [record], Refused if record.get("outcome") == REFUSED else Measured)
     return found
 
 

@@ -106,13 +106,63 @@ def test_verdicts_of_a_suite_that_are_no_json_are_named(content, tmp_path, capsy
     assert "x.json: is not JSON" in capsys.readouterr().err
 
 
-def test_closed_loops_and_convergence_name_the_missing_field_of_a_record(tmp_path, capsys):
-    """The record lacks its cost."""
-    faulty = tmp_path / "records.jsonl"
-    faulty.write_bytes(record_with("cost"))
-    for command in ("closed-loops", "convergence"):
-        assert crosscheck([command, "--records", str(faulty)]) == 2
-        assert "record 'k1': cost: field required" in capsys.readouterr().err
+INVARIANT = {
+    "key": "mujoco, tuned whirl 1",
+    **{"row": "mujoco, tuned", "engine": "mujoco", "version": "1", "family": "tuned", "message": ""},
+    **{"experiment": "whirl", "outcome": "COMPLETED", "x": 1e-3, "values": {"energy": 1e-6}},
+}
+
+
+def table(command: str, place: Path, record: Any, end: bytes = b"\n") -> int:
+    """Return the status of a command that prints the table of a file with one record."""
+    path = place / "records.jsonl"
+    path.write_bytes(json.dumps(record).encode() + end)
+    return crosscheck([command, "--records", str(path)])
+
+
+@pytest.mark.parametrize(
+    ("commands", "changes", "said"),
+    [
+        (("closed-loops", "convergence"), {"cost": None}, "cost: field required"),
+        (("closed-loops", "convergence"), {"cost": {"seconds": 1.0}}, "cost.steps: field required"),
+        (("closed-loops", "convergence"), {"outcome": ["COMPLETED"]}, "outcome: input should be"),
+        (("closed-loops", "convergence"), {"outcome": "REFUSED"}, "owner: field required"),
+        (
+            ("closed-loops", "convergence"),
+            {"asked": {"engine": "mbref", "options": {"step": "short"}}},
+            "asked.options: step: must be a positive number",
+        ),
+        (("invariants",), {"row": "mujoco"}, "row must begin with the engine, 'mujoco'"),
+        (("invariants",), {"values": None}, "x and values are required of a run"),
+        (("invariants",), {"x": "1"}, "x: input should be a valid number"),
+    ],
+    ids=lambda value: str(value)[:20],
+)
+def test_table_of_records_names_the_faulty_field(commands, changes, said, tmp_path, capsys):
+    """A field has another value, or is missing (None)."""
+    for command in commands:
+        record = {**(INVARIANT if command == "invariants" else RECORD), **changes}
+        assert table(command, tmp_path, {k: v for k, v in record.items() if v is not None}) == 2
+        shown = capsys.readouterr().err
+        assert said in shown and shown.count("\n") == 1
+
+
+@pytest.mark.parametrize(("command", "record"), [("convergence", RECORD), ("invariants", INVARIANT)])
+def test_table_of_records_names_those_that_it_cannot_show(command, record, tmp_path, capsys):
+    """Of a mechanism or experiment that is not in the table. An incomplete line is named, and a whole one is
+    read without its end."""
+    lost = {**record, "key": "k2", "engine": "none", "row": "none, tuned", "experiment": "none"}
+    assert table(command, tmp_path, lost) == 0
+    assert capsys.readouterr().err == "no row and column of the table has record 'k2'\n"
+    assert table(command, tmp_path, record, b"\n{") == 0
+    assert "the last line is incomplete and was left out" in capsys.readouterr().err
+    shown = [table(command, tmp_path, record, end) or capsys.readouterr().out for end in (b"", b"\n")]
+    assert shown[0] == shown[1]
+
+
+def test_motion_without_bodies_is_named(tmp_path, capsys):
+    assert report(["--render", str(folder(tmp_path / "r", record_with("bodies", {})))]) == 2
+    assert "record 'k1': bodies: pictures require states of all bodies" in capsys.readouterr().err
 
 
 def test_records_of_another_mechanism_than_the_scene_file_are_named_and_not_left_out(tmp_path, capsys):
