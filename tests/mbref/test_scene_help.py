@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from crosscheck.conformance.changes.units import in_other_units
 from mbref.cli import main
 from mbref.cli.output import Lines
 from mbref.cli.scene_files import schema, template
@@ -281,9 +282,28 @@ def test_command_diagnose_names_an_exchange_that_frees_redundant_constraints(my_
     assert found["redundant"] == 3 and {"B": "inline"} in found["exchanges"]
 
 
-def test_command_assemble_refuses_a_negative_length(my_toml, capsys):
-    assert main(["assemble", my_toml, "--length", "A-B=-1"]) == 2
-    assert "A-B=-1" in capsys.readouterr().err
+def test_command_assemble_refuses_a_negative_length_and_two_lengths_of_a_pair(my_toml, capsys):
+    for lengths, said in ((["A-B=-1"], "got 'A-B=-1'"), (["A-B=0.25", "B-A=0.3"], "gives B-A twice")):
+        assert main(["assemble", my_toml, *(f"--length={length}" for length in lengths)]) == 2
+        assert said in capsys.readouterr().err
+
+
+def test_command_assemble_refuses_a_pair_of_joints_with_two_meanings(tmp_path, capsys):
+    joints = [
+        joint.model_copy(update={"name": name})
+        for joint, name in zip(pinned_four_bar().joint, ("A", "B-C", "C", "A-B"), strict=True)
+    ]
+    path = tmp_path / "hyphens.toml"
+    pinned_four_bar().with_(joint=joints).save(path)
+    assert main(["assemble", str(path), "--length=A-B-C=0.5"]) == 2
+    assert "may be the joints 'A' and 'B-C' or 'A-B' and 'C'" in capsys.readouterr().err
+
+
+def test_command_assemble_names_moved_joints_of_a_linkage_of_a_micrometre(tmp_path, capsys):
+    path = tmp_path / "small.toml"
+    in_other_units(pinned_four_bar(), 1e-6, 1.0).save(path)
+    assert main(["assemble", str(path), "--length=A-B=0.5000001e-6"]) == 0
+    assert "joint B: moved by" in capsys.readouterr().out
 
 
 def pinned_four_bar() -> Scene:
