@@ -13,6 +13,7 @@ from crosscheck.engines.sdf.frames import MODEL, WORLD
 from mbref.scene import SceneError
 
 STATIC = "static"  # attribute of a link that does not move
+IN_MODEL = "in_model"  # attribute of an axis whose direction is given in the frame of the model
 FORMATS = ("", "euler_rpy", "quat_xyzw")
 
 
@@ -105,10 +106,9 @@ class _Writer:
         xyz = axis.find("xyz") if axis is not None else None
         if axis is None or xyz is None:
             return
-        in_model = axis.findtext("use_parent_model_frame", "").strip().lower()
         if given := xyz.get("expressed_in"):
             xyz.set("expressed_in", _full(given, prefix, frame))
-        elif in_model in ("true", "1"):
+        elif axis.get(IN_MODEL):
             xyz.set("expressed_in", frame)
         mimic = axis.find("mimic")
         if mimic is not None:

@@ -8,6 +8,8 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from crosscheck.engines.sdf.elements import is_true
+from crosscheck.engines.sdf.flattening import IN_MODEL
 from crosscheck.engines.shared import xml_files
 from crosscheck.engines.shared.xml_files import DEEPEST
 from mbref.scene import SceneError
@@ -16,6 +18,7 @@ VARIABLES = ("SDF_PATH", "GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GA
 SCHEMES = ("model://", "file://", "package://")
 CONFIGURATION, MODEL_FILE = "model.config", "model.sdf"
 AXES_IN_MODEL = (1, 4)  # last version whose axes are given in the frame of the model
+EXPRESSED_IN = (1, 7)  # first version whose axes name their frame, in place of use_parent_model_frame
 OVERRIDES = ("pose", "static")
 STILL = ("sun", "ground_plane", "asphalt_plane")  # models of Gazebo's library in which nothing moves
 
@@ -33,12 +36,17 @@ def expanded(root: ET.Element, file: Path) -> ET.Element:
 
 
 def state_frame_of_axes(root: ET.Element) -> None:
-    """Write into each axis whether its file's version gives axes in the frame of the model."""
-    in_model = _version(root) <= AXES_IN_MODEL
-    for tag in ("axis", "axis2"):
-        for axis in root.iter(tag):
-            if axis.find("use_parent_model_frame") is None:
-                ET.SubElement(axis, "use_parent_model_frame").text = str(in_model).lower()
+    """Write into each axis whether it is given in the frame of the model, by its file's version; versions
+    from 1.7 on have no element for it."""
+    version = _version(root)
+    if version >= EXPRESSED_IN:
+        return
+    for axis in (axis for tag in ("axis", "axis2") for axis in root.iter(tag)):
+        given = axis.find("use_parent_model_frame")
+        if is_true(given) or (given is None and version <= AXES_IN_MODEL):
+            axis.set(IN_MODEL, "true")
+        if given is not None:
+            axis.remove(given)
 
 
 def _version(root: ET.Element, where: str = "") -> tuple[int, ...]:

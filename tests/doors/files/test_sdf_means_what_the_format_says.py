@@ -48,6 +48,24 @@ def test_a_joint_without_a_pose_is_at_its_child_link_whatever_its_name(files, na
 
 
 @pytest.mark.parametrize(
+    ("version", "given", "axis"),
+    [
+        ("1.4", "", (1.0, 0.0, 0.0)),
+        ("1.6", "", (0.0, 1.0, 0.0)),
+        ("1.6", "<use_parent_model_frame>1</use_parent_model_frame>", (1.0, 0.0, 0.0)),
+        ("1.9", "<use_parent_model_frame>1</use_parent_model_frame>", (0.0, 1.0, 0.0)),
+    ],
+)
+def test_an_axis_is_in_the_frame_of_the_model_by_the_rule_of_its_version(files, version, given, axis):
+    """The link is turned by π/2 about z. Version 1.7 took the element away: its file's note says so."""
+    arm = link("arm", f"0.5 0 0 0 0 {math.pi / 2!r}")
+    shoulder = joint("shoulder", "revolute", "world", "arm", "1 0 0", inside=given)
+    scene, notes = files.scene(sdf(arm, shoulder, version=version), "arm.sdf")
+    assert scene.joint_named("shoulder").axis == pytest.approx(axis, abs=1e-15)
+    assert ("<use_parent_model_frame> of a axis: is not read" in notes) == (version == "1.9")
+
+
+@pytest.mark.parametrize(
     ("more", "metres_a_turn"),
     [
         ("<thread_pitch>50</thread_pitch>", -2 * math.pi / 50),
