@@ -33,8 +33,8 @@ RATE_CONFLICT = 5e-11  # difference of rates over the largest rate of a driver t
 RATE_SHARE = 2e-10  # the same over 1/duration: tables of 13 digits differ by less
 MOST_DRIVER_ROWS = 300  # constraint rows; of larger mechanisms singular values take too long
 POSE_STEPS = 20  # largest number of Newton steps to a pose
-LARGEST_TURN = 1.0  # rad of a body at a time; two bodies then turn by less than half a turn to each other
-MOST_PARTS = 100  # largest number of parts of a Newton step
+TURN_OF_A_PART = 1.0  # rad of a body at a time; two bodies then turn by less than half a turn to each other
+MOST_PARTS_OF_STEP = 100  # largest number of parts of a Newton step
 LAST_MOVE = 1e-15  # change of a pose by the last Newton step, lengths of the mechanism or rad
 
 
@@ -241,7 +241,7 @@ def _terms(model: Model, time: float, pose: _Pose) -> Terms:
 def _moved(model: Model, pose: _Pose, x: np.ndarray) -> _Pose:
     """Return the pose after displacements x (n,), in parts over which angles are counted."""
     turned = np.linalg.norm(x.reshape(-1, 6)[:, 3:], axis=1).max(initial=0.0)
-    count = max(1, min(math.ceil(turned / LARGEST_TURN), MOST_PARTS))
+    count = max(1, min(math.ceil(turned / TURN_OF_A_PART), MOST_PARTS_OF_STEP))
     for _ in range(count):
         q = displaced(pose.q, x / count)
         pose = _Pose(q, angles_at(model, q, pose.angles))
