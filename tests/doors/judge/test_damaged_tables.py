@@ -24,6 +24,8 @@ def rows(cell: str, at: int | None = None, rate: str = "16") -> str:
 
 OFF = {
     "zeros": rows("0", rate="0"),
+    # 16 t rad read as degrees are below 0.06 rad, about the rounding of the zeros
+    "zeros with a decimal": "\n".join(["time,A.angle", *(f"{k / 25:.2f},0.0" for k in range(6))]),
     "huge numbers": rows("1e308"),
     "huge numbers of both signs": "\n".join(
         [HEAD, *(f"{t},{'-' * (k % 2)}1.7e308,16" for k, t in enumerate(TIMES))]
