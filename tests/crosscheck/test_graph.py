@@ -5,14 +5,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from crosscheck.engines.shared.driver_motion import motion
-from crosscheck.engines.shared.initial_velocities import initial_rates, twist_maps
 from crosscheck.engines.shared.spanning_tree import GROUND_LINK, Link, Tree, effective_mass, spanning_tree
-from crosscheck.judge.constraints import initial_twists
 from mbref import rotations
-from mbref.scene import JOINT_TYPES, Body, Coupling, Distance, Driver, Scene, Sine
+from mbref.scene import JOINT_TYPES, Body, Coupling, Distance, Driver, Scene
 from mbref.scenes import SCENES
-from tests.crosscheck.tree_scenes import INERTIA, body, driven, every_joint, ring
+from tests.crosscheck.tree_scenes import INERTIA, body, every_joint, ring
 from tests.helpers.parts import X, block, hinge, joint
 
 KINDS = tuple(JOINT_TYPES.values())
@@ -160,38 +157,6 @@ def test_a_rod_takes_less_than_half_of_the_effective_mass_at_its_ends() -> None:
 
 SOLVED = 1e-11  # of the largest velocity, and at least 1e-11 m/s: rounding of a linear system of 100 rows
 SCENE_LIST = [*SCENES, "every_joint", "driven", "ring_universal"]
-
-
-@pytest.mark.parametrize("name", SCENE_LIST)
-def test_start_rates_of_a_tree_give_the_judges_consistent_velocities(name: str) -> None:
-    """Twists of bodies from joint rates of the adapters' tree, and by the judge, which has no tree."""
-    own = {"every_joint": every_joint, "driven": driven, "ring_universal": lambda: ring("universal")}
-    scene = {**SCENES, **own}[name]()
-    tree = spanning_tree(scene)
-    twists = (twist_maps(tree) @ initial_rates(scene, tree))[list(tree.own)]
-    expected = np.hstack(initial_twists(scene))
-    off = abs(twists - expected).max()
-    assert off < SOLVED * max(1.0, abs(expected).max()), (
-        f"{name}: twists off by {off:.2e} of {abs(expected).max():.3g}"
-    )
-
-
-@given(
-    st.lists(st.floats(-3, 3), min_size=1, max_size=4), st.floats(-2, 2), st.floats(0.1, 5), st.floats(0, 1)
-)
-def test_rate_and_acceleration_of_a_driver_are_differences_of_its_values(c, amplitude, frequency, t) -> None:
-    """The truncation of central differences is h² / 6 of the third and h² / 12 of the fourth derivative,
-    which are below 350 and 1400: below 2e-6. The rounding of the second difference is 1e-14 / h² = 1e-6."""
-    allowed = 1e-5
-    driver = Driver(
-        joint="A", polynomial=(0.0, *c), sine=Sine(amplitude=amplitude, frequency=frequency, phase=0.0)
-    )
-    h = 1e-4  # s
-    values = [motion(driver, t + k * h)[0] for k in (-1, 0, 1)]
-    _, rate, acceleration = motion(driver, t)
-    slope, bend = (values[2] - values[0]) / (2 * h), (values[2] - 2 * values[1] + values[0]) / h**2
-    assert abs(rate - slope) < allowed, f"rate {rate} against the slope {slope} of the values"
-    assert abs(acceleration - bend) < allowed, f"acceleration {acceleration} against their bend {bend}"
 
 
 @given(graphs(), st.sampled_from([(), ("spherical", "revolute")]))

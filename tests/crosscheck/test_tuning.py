@@ -11,7 +11,7 @@ from crosscheck.cli.options import length
 from crosscheck.engine import Setting
 from crosscheck.study.grid import Case, key
 from crosscheck.study.search.cheapest import by_closure, tuned
-from crosscheck.study.search.neighbours import STEP, between, coarser, longest_step, within, work
+from crosscheck.study.search.neighbours import STEP, longest_step, within, work
 from mbref import rotations
 from mbref.motions.trajectory import Cost
 from mbref.scene import Body, Scene
@@ -157,34 +157,6 @@ def test_no_setting_reaches_an_error_below_the_truth_s_bound():
 
 def _rough(record: dict[str, Any], bound: float) -> dict[str, Any]:
     return {**record, "metrics": {**record["metrics"], "error_bound": bound}}
-
-
-def test_setting_between_two_is_their_geometric_mean():
-    """Step and gain are interpolated, a constant stays; equal settings and counts have none between."""
-    first, second = (Setting("f", {"step": h, "beta": 0.2 / h, "hard": 1e-7}) for h in (0.1, 0.025))
-    assert between(first, second) == Setting("f", {"step": 0.05, "beta": 4.0, "hard": 1e-7})
-    assert between(first, first) is None
-    assert between(Setting("f", {"n": 1}), Setting("f", {"n": 4})) is None
-
-
-def test_coarser_setting_continues_the_ratio_up_to_the_longest_step_or_tolerance_0_5():
-    """Steps 0.025 and 0.1 s continue to 0.4 s, tolerances 0.01 and 0.1 to 0.5. An option that both share
-    stays; the others, as beta ~ 1 / step, continue by their own ratio."""
-    first, second = (Setting("f", {"step": h, "beta": 0.2 / h, "hard": 1e-7}) for h in (0.1, 0.025))
-    assert coarser(first, second, longest=1.0) == Setting("f", {"step": 0.4, "beta": 0.5, "hard": 1e-7})
-    assert coarser(first, second, longest=0.2) == Setting("f", {"step": 0.2, "beta": 1.0, "hard": 1e-7})
-    loose = [Setting("f", {"rtol": r}) for r in (0.1, 0.01)]
-    assert coarser(*loose, longest=0.01) == Setting("f", {"rtol": 0.5})
-    assert coarser(Setting("f", {"rtol": 0.01}), Setting("f", {"rtol": 1e-3}), 9.0) == loose[0]
-
-
-def test_there_is_no_coarser_setting_than_the_longest_step_tolerance_0_5_or_one_iteration():
-    """Nor does a setting beside itself, from which no ratio follows, lead to a coarser one."""
-    first, second = (Setting("f", {"step": h}) for h in (0.1, 0.025))
-    assert coarser(first, second, longest=0.1) is None
-    assert coarser(first, first, longest=1.0) is None
-    assert coarser(*(Setting("f", {"rtol": r}) for r in (0.5, 0.1)), longest=9.0) is None
-    assert coarser(*(Setting("f", {"iterations": n}) for n in (1.0, 2.0)), longest=9.0) is None
 
 
 def test_steps_are_limited_by_the_longest_interval_between_samples():

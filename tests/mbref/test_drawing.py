@@ -270,12 +270,6 @@ def test_every_load_and_driver_has_a_picture_of_its_own():
     assert len(pictures) == len(loads) + len(drivers) + 1
 
 
-def test_names_in_a_picture_are_escaped_and_it_has_no_script():
-    scene = SCENES["point_pendulum"]().with_(name="<a & b>")
-    picture = still(scene)
-    assert "&lt;a &amp; b&gt;" in picture and "<script" not in picture
-
-
 def test_png_has_two_pixels_for_each_of_the_svg():
     """Bytes 16 to 24 of a PNG are its width and height (PNG specification, IHDR)."""
     picture = still(SCENES["four_bar"](), width=300.0)
