@@ -34,7 +34,7 @@ def energy_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
 
 def energy_gain(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
     """Return `energy_series` (k,) with its sign: positive where the run has gained energy."""
-    balance = _balance(scene, trajectory)
+    balance = energy_balance(scene, trajectory)
     if balance is None:
         return None
     gain, scale = balance
@@ -46,11 +46,11 @@ def energy_drift(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
 
     The result is None or infinite as in `energy_series`, but a number if all energies are at rounding level.
     """
-    balance = _balance(scene, trajectory)
+    balance = energy_balance(scene, trajectory)
     return None if balance is None else np.abs(balance[0])
 
 
-def _balance(scene: Scene, trajectory: Trajectory) -> tuple[np.ndarray, float] | None:
+def energy_balance(scene: Scene, trajectory: Trajectory) -> tuple[np.ndarray, float] | None:
     """Return the gain (k,) in J, and the largest energy of the motion (J); None if there is no energy
     balance."""
     works = any(load.is_damped or load.over_time for load in scene.load)

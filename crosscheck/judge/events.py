@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from crosscheck.judge.constraints import joint_coordinates, scene_length
+from crosscheck.judge.energy import energy_balance
 from crosscheck.judge.impacts import impact
 from crosscheck.judge.joint_reactions import resultants
 from crosscheck.judge.loads import world_inertia
-from crosscheck.judge.pieces import State, at_start, has_pieces, later
+from crosscheck.judge.pieces import State, at_start, has_pieces, later, without_rounding
 from mbref import rotations
 from mbref.motions.event import Event
 from mbref.motions.trajectory import PER_BODY, Trajectory
@@ -51,8 +52,9 @@ def _pieces(scene: Scene, trajectory: Trajectory) -> Iterator[tuple[float, Scene
 
 def _after(scene: Scene, piece: Scene, event: Event) -> Scene:
     """Return the piece that begins at an event of a run, with the run's velocities after it."""
-    state = State(event.position, event.orientation, event.velocity_after, event.angular_velocity_after)
-    return later(scene, piece, event.time, state, _moved(scene, event))
+    before = State(event.position, event.orientation, event.velocity, event.angular_velocity)
+    after = before._replace(velocity=event.velocity_after, angular_velocity=event.angular_velocity_after)
+    return later(scene, piece, event.time, without_rounding(scene, after, before), _moved(scene, event))
 
 
 def _moved(scene: Scene, event: Event) -> dict[str, np.ndarray]:
@@ -81,17 +83,29 @@ def _between(motion: Trajectory, begin: float, end: float, turned: dict[str, flo
     return replace(motion, times=motion.times[chosen] - begin, **arrays, **tables, events=None)
 
 
+def energy_error(scene: Scene, trajectory: Trajectory) -> float | None:
+    """Return the largest drift of the energy balance within a piece, relative to the largest energy of all
+    pieces; None where a piece has no balance."""
+    found = [energy_balance(piece, own) for piece, own, _ in parts(scene, trajectory, None)]
+    known = [balance for balance in found if balance is not None]
+    scale = max((size for _, size in known), default=0.0)
+    if not scale or len(known) < len(found):
+        return None
+    return max(float(np.abs(gain).max()) for gain, _ in known) / scale
+
+
 def impulse_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
     """Return the largest difference of a body's change of momentum at an event from the impulses of its
-    joints, relative to the largest change; None without impulses."""
+    joints, relative to the largest change; None where a run does not give all impulses."""
     off, scale = [0.0], [0.0]
     for event, after in _impacts(scene, trajectory):
-        bare = after.with_(joint=[joint for joint in after.joint if joint.name in event.impulses])
+        if not {joint.name for joint in after.joint} <= set(event.impulses):
+            continue
         units = np.repeat([1.0, scene_length(scene)], 3)
         change = _momentum_change(scene, event) / units
         one = {name: wrench[None] for name, wrench in event.impulses.items()}
         state: dict[str, Any] = {"position": event.position[None], "orientation": event.orientation[None]}
-        pulls = resultants(bare, replace(trajectory, **state, reactions=one), 0) / units
+        pulls = resultants(after, replace(trajectory, **state, reactions=one), 0) / units
         off.append(float(np.abs(change - pulls).max()))
         scale.append(float(np.abs(change).max()))
     return max(off) / max(scale) if max(scale) else None

@@ -16,7 +16,7 @@ from crosscheck.judge.constraints import jacobian
 from crosscheck.judge.joint_coordinates import Reflected, reflected
 from crosscheck.judge.joint_reactions import of_multipliers, on_second, unit_rows
 from crosscheck.judge.loads import world_inertia
-from crosscheck.judge.pieces import State
+from crosscheck.judge.pieces import State, without_rounding
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
 from mbref.scene import Scene, SceneError
@@ -47,9 +47,8 @@ def impact(after: Scene, state: State) -> Impact:
         raise SceneError(["the drivers contradict constraints that begin to hold"])
     twists = (before + change).reshape(-1, 6)
     found = state._replace(velocity=twists[:, :3].copy(), angular_velocity=twists[:, 3:].copy())
-    return Impact(
-        found, _impulses(after, rows, state, mass, geared, change), float(change @ mass @ change) / 2
-    )
+    impulses = _impulses(after, rows, state, mass, geared, change)
+    return Impact(without_rounding(after, found, state), impulses, float(change @ mass @ change) / 2)
 
 
 def _mass_matrix(scene: Scene, state: State) -> tuple[np.ndarray, Reflected]:

@@ -18,6 +18,7 @@ from mbref.scene import GROUND, Body, Joint, JointLoad, Scene, SceneError
 from mbref.scene.joints import ANGLE
 
 MISSED = 1e-6  # gap of a given pose (lengths of the mechanism, or rad) above which a joint cannot engage
+AT_REST = 1e-12  # velocity after an impact / speed of the scene, below which bodies have come to rest
 PERMANENT: dict[str, Any] = {"active": None, "engages": "anywhere"}
 
 
@@ -28,6 +29,25 @@ class State(NamedTuple):
     orientation: np.ndarray
     velocity: np.ndarray
     angular_velocity: np.ndarray
+
+
+def without_rounding(scene: Scene, after: State, before: State) -> State:
+    """Return the state after an impact, at rest if its velocities are rounding: of the velocities before it,
+    or of the speeds of falling and of crossing the scene's length in its duration."""
+    length = scene_length(scene)
+    speeds = [
+        np.sqrt(length * np.linalg.norm(scene.gravity)),
+        length / scene.duration,
+        _fastest(before, length),
+    ]
+    if _fastest(after, length) > AT_REST * max(speeds):
+        return after
+    return after._replace(velocity=0.0 * after.velocity, angular_velocity=0.0 * after.angular_velocity)
+
+
+def _fastest(state: State, length: float) -> float:
+    """Return the largest velocity, or angular velocity times a length (m), in m/s."""
+    return float(max(np.abs(state.velocity).max(), length * np.abs(state.angular_velocity).max()))
 
 
 def has_pieces(scene: Scene) -> bool:

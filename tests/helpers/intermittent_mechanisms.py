@@ -1,4 +1,4 @@
-"""Random mechanisms whose joints and couplings hold in random intervals of time."""
+"""Mechanisms whose joints and couplings hold in intervals of time: two with closed forms, and random ones."""
 
 from typing import Any
 
@@ -7,10 +7,44 @@ import numpy as np
 from crosscheck.conformance.mechanisms.geared import geared_mechanism
 from crosscheck.conformance.mechanisms.random_scenes import mechanism
 from mbref.scene import Scene
+from tests.helpers.parts import block, hinge, joint, slide
 
-DURATION = 0.3  # s
-CHANGES = (0.07, 0.13, 0.2, 0.26)  # s; times at which constraints can begin or cease to hold
+DURATION = 0.3  # s, of random mechanisms
+CHANGES = (0.07, 0.13, 0.2, 0.26)  # s; times at which their constraints can begin or cease to hold
 SHARE = 0.6  # fraction of the joints without drivers, couplings and armatures that have intervals
+
+
+def carts(**latch: Any) -> Scene:
+    """Two carts of 1 kg and 3 kg on a line, at 2 m/s and -1 m/s, that latch at 0.1 s and let go at 0.3 s."""
+    return Scene(
+        name="carts",
+        duration=0.5,
+        body=[
+            block("one", (0.0, 0.0, 0.0), 1.0, velocity=[2.0, 0.0, 0.0]),
+            block("two", (1.0, 0.0, 0.0), 3.0, velocity=[-1.0, 0.0, 0.0]),
+        ],
+        joint=[
+            slide("A", "ground", "one", (0.0, 0.0, 0.0)),
+            slide("B", "ground", "two", (1.0, 0.0, 0.0)),
+            joint("L", "fixed", "one", "two", active=[[0.1, 0.3]]) | latch,
+        ],
+    )
+
+
+def rotors() -> Scene:
+    """Rotors of 0.1 kg m² at 6 rad/s and 0.3 kg m², an armature of 0.2 kg m², a clutch from 0.2 s on."""
+    spins, straight = {"angular_velocity": [0.0, 0.0, 6.0]}, {"orientation": [1.0, 0.0, 0.0, 0.0]}
+    rotor, load = ({**straight, "inertia": [size] * 3} for size in (0.1, 0.3))
+    return Scene(
+        name="rotors",
+        duration=0.4,
+        body=[block("a", (0.0, 0.0, 0.0), **rotor, **spins), block("b", (0.0, 0.0, 1.0), **load)],
+        joint=[
+            hinge("A", "ground", "a", (0.0, 0.0, 0.0), armature=0.2),
+            hinge("B", "ground", "b", (0.0, 0.0, 1.0)),
+        ],
+        coupling=[{"name": "clutch", "joints": ["A", "B"], "ratio": 0.5, "active": [[0.2, 1.0]]}],
+    )
 
 
 def intermittent_mechanism(seed: int) -> Scene:
@@ -23,14 +57,12 @@ def intermittent_mechanism(seed: int) -> Scene:
     busy |= {joint.name for joint in scene.joint if joint.reflected_inertia or joint.type == "universal"}
     free = [joint.name for joint in scene.joint if joint.name not in busy]
     chosen = {name for name in free if rng.random() < SHARE} or set(free[:1])
-    loads = [load for load in scene.load if getattr(load, "joint", None) not in chosen]
-    joints = [
-        joint.model_copy(update=_intervals(rng) if joint.name in chosen else {}) for joint in scene.joint
-    ]
-    couplings = [each.model_copy(update=_intervals(rng)) for each in scene.coupling]
-    return scene.with_(
-        name=f"intermittent_{seed}", duration=DURATION, joint=joints, coupling=couplings, load=loads
-    )
+    parts = {
+        "joint": [j.model_copy(update=_intervals(rng) if j.name in chosen else {}) for j in scene.joint],
+        "coupling": [each.model_copy(update=_intervals(rng)) for each in scene.coupling],
+        "load": [load for load in scene.load if getattr(load, "joint", None) not in chosen],
+    }
+    return scene.with_(name=f"intermittent_{seed}", duration=DURATION, **parts)
 
 
 def _intervals(rng: np.random.Generator) -> dict[str, Any]:

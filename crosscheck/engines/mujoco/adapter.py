@@ -26,13 +26,15 @@ from crosscheck.engines.mujoco.families import (
 )
 from crosscheck.engines.mujoco.model import SUPPORTS
 from crosscheck.engines.mujoco.simulation import Simulation
+from crosscheck.engines.mujoco.switched import SwitchedRun, refusal, served
 from crosscheck.engines.mujoco.ways import ALTERNATIVES
 from crosscheck.engines.shared.driver_motion import fastest_rate
 from crosscheck.engines.shared.initial_velocities import lacks_mass
 from crosscheck.engines.shared.planar_scene import planar_scene
 from crosscheck.engines.shared.sampling import run_through
+from crosscheck.judge.pieces import at_start
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import Scene
+from mbref.scene import Scene, intermittent
 
 # parts of a new model that have defaults; reading a name of a default class ends the process
 DEFAULTS = (
@@ -48,7 +50,7 @@ class MuJoCo(linearised.Linearised, Engine):
 
     name = "mujoco"
     package = "mujoco"
-    supports = SUPPORTS
+    supports = replace(SUPPORTS, intervals=True)
     families, options = FAMILIES | original.FAMILIES, OPTIONS | original.OPTIONS
     integrated_here, alternatives = INTEGRATED_HERE, ALTERNATIVES
     defaults_of = tuple(f"mujoco.MjSpec().{part}" for part in DEFAULTS)
@@ -60,13 +62,15 @@ class MuJoCo(linearised.Linearised, Engine):
         return mujoco.__version__
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Refuse scenes without masses whose motion the drivers do not determine completely."""
-        return lacks_mass(scene)
+        """Refuse scenes without masses whose motion the drivers do not determine completely, and joints with
+        intervals that no equality of MuJoCo can switch."""
+        return lacks_mass(at_start(scene)) or refusal(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
         """Return fixed steps chosen by the angle that a body turns in one step, and adaptive steps by
         relative tolerance."""
-        return sweep(scene, fastest_rate(scene, lambda step: self._coarse(scene, step)))
+        first = at_start(scene)
+        return served(scene, sweep(first, fastest_rate(first, lambda step: self._coarse(scene, step))))
 
     def serves(self, scene: Scene, family: str) -> bool:
         """Return whether a family can run a scene; `tuned` and `chosen` run every scene."""
@@ -94,13 +98,15 @@ class MuJoCo(linearised.Linearised, Engine):
         if setting.family in COMPILED and (planar := planar_scene(scene)) is not scene:
             return replace(self.run(planar, times, setting), reactions=None)
         start = time.process_time()
-        run = Simulation(scene, setting)
         labels = {
             "engine": self.name,
             "version": self.version(),
             "method": setting.family,
             "settings": dict(setting.options),
         }
+        if any(intermittent(scene)):
+            return SwitchedRun(scene, setting).trajectory(times, start, labels)
+        run = Simulation(scene, setting)
         with run.installed(), np.errstate(all="ignore"):
             if setting.family in COMPILED:
                 return run.integrated(times, start, labels)

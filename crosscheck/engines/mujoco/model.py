@@ -8,6 +8,7 @@ simplify the model.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,12 +27,26 @@ from crosscheck.engines.shared.spanning_tree import (
     Tree,
     spanning_tree,
 )
+from crosscheck.judge.pieces import holds
 from crosscheck.refusals import FACTOR, TABLE
 from mbref import rotations
-from mbref.scene import JOINT_TYPES, Coupling, Driver, Factor, Force, JointLoad, Moment, Scene, Spring
+from mbref.scene import (
+    GROUND,
+    JOINT_TYPES,
+    Coupling,
+    Driver,
+    Factor,
+    Force,
+    Joint,
+    JointLoad,
+    Moment,
+    Scene,
+    Spring,
+)
 
 SUPPORTS = replace(EVERYTHING, joints=tuple(JOINT_TYPES), over_time=(TABLE, FACTOR), massless_links=True)
 COUPLING = "coupling "  # prefix of the names of equalities that are couplings
+SWITCHED = "switched "  # prefix of the names of equalities that are joints with intervals, and of their sites
 UNIT = (1.0, 0.0, 0.0, 0.0)
 # placeholder moments, centre and axes during compilation
 GENERAL = ((1.0, 1.1, 1.2), (0.1, 0.2, 0.3), (0.5, 0.5, 0.1, 0.7))
@@ -62,12 +77,17 @@ class Compiled:
             target[number] += force * motion(factor, data.time, since)[0]
 
 
-def compiled(scene: Scene) -> Compiled:
-    """Return the scene as a MuJoCo model with the library's default options and softness."""
+def compiled(scene: Scene, switched: Sequence[Joint | Coupling] = ()) -> Compiled:
+    """Return the scene as a MuJoCo model with the library's default options and softness.
+
+    ``switched`` joints and couplings, which the scene does not have, are equalities that can be activated.
+    """
     import mujoco
 
     tree = spanning_tree(scene)
     built = _built(mujoco, scene, tree)
+    for part in switched:
+        built.add_switched(part)
     model = built.spec.compile()
     _write_masses(mujoco, model, tree)
     applied, pushed, timed = np.zeros((model.nbody, 6)), np.zeros(model.nv), []
@@ -170,6 +190,22 @@ class _Builder:
         names = [self.site(link, point, f"closure {k}.{i}") for i, link in enumerate(closure.links)]
         self._equality(kind, self.mujoco.mjtObj.mjOBJ_SITE, f"closure {k}", *names)
 
+    def add_switched(self, part: Joint | Coupling) -> None:
+        """Add a fixed or spherical joint, or a coupling, as an equality that is active from t = 0 on or
+        later."""
+        kinds = self.mujoco.mjtEq
+        if isinstance(part, Coupling):
+            equality = self.add_coupling(part)
+        else:
+            ends = enumerate(zip(part.bodies, part.anchor_pair, strict=True))
+            names = [
+                self.site(self.link_of(body), np.array(point), f"{SWITCHED}{part.name}.{i}")
+                for i, (body, point) in ends
+            ]
+            kind = kinds.mjEQ_WELD if part.type == "fixed" else kinds.mjEQ_CONNECT
+            equality = self._equality(kind, self.mujoco.mjtObj.mjOBJ_SITE, SWITCHED + part.name, *names)
+        equality.active = holds(part, 0.0)
+
     def add_driver(self, driver: Driver) -> None:
         joint = self.joint[self.tree.coordinate(self.scene, driver.joint)]
         kind = self.mujoco.mjtEq.mjEQ_JOINT
@@ -178,12 +214,13 @@ class _Builder:
         )
         equality.data[:5] = 0.0
 
-    def add_coupling(self, coupling: Coupling) -> None:
+    def add_coupling(self, coupling: Coupling) -> Any:
         """Add the equality q₂ = ratio · q₁, as MuJoCo's polynomial of degree 1."""
         first, second = (self.joint[i].name for i in self.tree.coupled(self.scene, coupling))
         kind, objects = self.mujoco.mjtEq.mjEQ_JOINT, self.mujoco.mjtObj.mjOBJ_JOINT
         equality = self._equality(kind, objects, COUPLING + coupling.name, second, first)
         equality.data[:5] = 0.0, coupling.gear_ratio, 0.0, 0.0, 0.0
+        return equality
 
     def _equality(self, kind: Any, objects: Any, name: str, first: str, second: str) -> Any:
         return self.spec.add_equality(type=kind, objtype=objects, name=name, name1=first, name2=second)
@@ -211,8 +248,8 @@ class _Builder:
             self.pushed.append((joint.name, action.amount, load.over_time))
 
     def link_of(self, body: str) -> int:
-        """Return the link of a scene's body, by name."""
-        return self.tree.link_of(self.scene.body_index(body))
+        """Return the link of a scene's body, or of the ground, by name."""
+        return GROUND_LINK if body == GROUND else self.tree.link_of(self.scene.body_index(body))
 
     def _force(self, k: int, load: Force) -> None:
         """Add a massless body fixed at the point of attack, because MuJoCo applies forces at centres of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,7 @@ from crosscheck.judge.time_functions import next_end
 from crosscheck.setting import unknown_family
 from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory
-from mbref.scene import Driver, Scene
+from mbref.scene import Coupling, Driver, Joint, Scene
 
 # rad; largest motion of a driver in an adaptive step, since closures may change branch within larger ones
 TURN_PER_STEP = 0.25
@@ -44,11 +44,11 @@ TURN_PER_STEP = 0.25
 class Simulation:
     """One simulation: a model, its data and the method by which they are advanced."""
 
-    def __init__(self, scene: Scene, setting: Setting):
+    def __init__(self, scene: Scene, setting: Setting, switched: Sequence[Joint | Coupling] = ()):
         import mujoco
 
         self.mujoco, self.scene, self.setting = mujoco, scene, setting
-        self.compiled = compiled(scene)
+        self.compiled = compiled(scene, switched)
         self.model = self.compiled.model
         self.counts = Counts()
         self.turned = np.array([body.orientation for body in scene.body])
@@ -132,22 +132,22 @@ class Simulation:
         built = time.process_time() - start
         return run.trajectory(self.scene, times, self.sample, built, labels)
 
-    def _rows(self, equality: int) -> np.ndarray:
+    def rows(self, equality: int) -> np.ndarray:
         """Return the constraint rows of an equality at this step; MuJoCo leaves out rows that no coordinate
         moves."""
         data, kind = self.data, int(self.mujoco.mjtConstraint.mjCNSTR_EQUALITY)
         return np.flatnonzero((data.efc_type == kind) & (data.efc_id == equality))
 
-    def _driven(self) -> list[tuple[int, Driver]]:
+    def driven(self) -> list[tuple[int, Driver]]:
         """Return the rows of the drivers at this step."""
-        return [(int(row), d) for equality, d in self.compiled.drivers for row in self._rows(equality)[:1]]
+        return [(int(row), d) for equality, d in self.compiled.drivers for row in self.rows(equality)[:1]]
 
     def _drive(self, model: Any, data: Any) -> None:
         """Add drivers' motion to the reference accelerations of their rows; apply loads over time."""
         if self.compiled.timed:
             self.compiled.apply(data, self.since)
         reference, gains = data.efc_aref, data.efc_KBIP
-        for row, driver in self._driven():
+        for row, driver in self.driven():
             value, rate, acceleration = motion(driver, data.time, self.since)
             stiffness, damping, impedance, _ = gains[row]
             reference[row] += acceleration + damping * rate + stiffness * impedance * value
@@ -198,7 +198,7 @@ class Simulation:
         return np.concatenate((self._position_rates(data.qpos, data.qvel), data.qacc))
 
     def _settle(self, t: float, y: np.ndarray) -> np.ndarray:
-        return projected(self.mujoco, self.model, self.data, self._driven, t, self._load, y)
+        return projected(self.mujoco, self.model, self.data, self.driven, t, self._load, y)
 
     def _position_rates(self, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
         model = self.model
@@ -270,7 +270,7 @@ class Simulation:
         data, tree, wrenches = self.data, self.compiled.tree, []
         for k, closure in enumerate(tree.closures):
             if closure.kind == "point":
-                rows = self._rows(self.model.equality(f"closure {k}").id)
+                rows = self.rows(self.model.equality(f"closure {k}").id)
                 point = data.site(f"closure {k}.1").xpos
                 wrenches.append(wrench(-data.efc_force[rows] if len(rows) else np.zeros(3), point))
             else:

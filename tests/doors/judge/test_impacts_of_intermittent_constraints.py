@@ -1,4 +1,4 @@
-"""The judge of scenes whose constraints come and go: reference, balances of impacts, wrong runs."""
+"""The judge of scenes whose constraints come and go: reference, balances of impacts, wrong runs, engines."""
 
 from dataclasses import replace
 
@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 import mbref
-from crosscheck.engine import BUILT_IN, engine
+from crosscheck.engine import Setting, engine
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.reference.piecewise import motion_by
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref import Scene
-from tests.helpers.intermittent_mechanisms import intermittent_mechanism
-from tests.helpers.parts import block, hinge, joint, slide
+from tests.helpers.intermittent_mechanisms import carts, intermittent_mechanism, rotors
+from tests.helpers.parts import hinge, joint, rod
 
 FORMULATIONS = {"A": natural_motion, "B": tree_motion}
 ROUNDING = 1e-13  # of the references, in m, m/s and rad/s of mechanisms of about 1 m
@@ -29,38 +29,19 @@ BALANCES = (
 CLOSE = 1e-10  # of mbref's balances and violations, whose rounding grows with the singular values of rows
 
 
-def carts() -> Scene:
-    """Two carts on a line that latch at 0.1 s, and let go at 0.3 s."""
+def caught() -> Scene:
+    """Two falling rods that a ball joint catches at 0.3 s, so that they come to rest, and that move again."""
     return Scene(
-        name="carts",
-        duration=0.5,
-        body=[
-            block("one", (0.0, 0.0, 0.0), 1.0, velocity=[2.0, 0.0, 0.0]),
-            block("two", (1.0, 0.0, 0.0), 3.0, velocity=[-1.0, 0.0, 0.0]),
-        ],
+        name="caught",
+        gravity=(0.0, -9.81, 0.0),
+        duration=1.0,
+        body=[rod("a", (0, 0, 0), (1, 0, 0), 2.0), rod("b", (1, 0, 0), (1.8, 0, 0), 1.0)],
         joint=[
-            slide("A", "ground", "one", (0.0, 0.0, 0.0)),
-            slide("B", "ground", "two", (1.0, 0.0, 0.0)),
-            joint("L", "fixed", "one", "two", active=[[0.1, 0.3]]),
+            hinge("A", "ground", "a", (0.0, 0.0, 0.0)),
+            joint("B", "spherical", "a", "b", (1.0, 0.0, 0.0), active=[[0.0, 0.6]]),
+            joint("C", "spherical", "b", "ground", (1.6, 0.0, 0.0), active=[[0.3, 0.7]]),
+            joint("W", "fixed", "a", "b", (1.0, 0.0, 0.0), active=[[0.5, 0.6]]),
         ],
-    )
-
-
-def rotors() -> Scene:
-    """Two rotors of 0.1 and 0.3 kg m², an armature of 0.2 kg m², and a clutch between them from 0.2 s on."""
-    spins = {"angular_velocity": [0.0, 0.0, 6.0]}
-    return Scene(
-        name="rotors",
-        duration=0.4,
-        body=[
-            block("a", (0.0, 0.0, 0.0), orientation=[1, 0, 0, 0], inertia=[0.1] * 3) | spins,
-            block("b", (0.0, 0.0, 1.0), orientation=[1, 0, 0, 0], inertia=[0.3] * 3),
-        ],
-        joint=[
-            hinge("A", "ground", "a", (0.0, 0.0, 0.0), armature=0.2),
-            hinge("B", "ground", "b", (0.0, 0.0, 1.0)),
-        ],
-        coupling=[{"name": "clutch", "joints": ["A", "B"], "ratio": 0.5, "active": [[0.2, 1.0]]}],
     )
 
 
@@ -105,12 +86,11 @@ def test_many_random_motions_through_impacts_agree_with_the_reference(seed):
 
 
 def test_wrong_impacts_are_measured():
-    """An impulse, a velocity after the latch, or an energy that is 1 % off."""
+    """An impulse, a velocity after the latch, or an energy that is off by a hundredth or more."""
     scene, run = carts(), mbref.simulate(carts(), times=[0.0, 0.2, 0.5])
     latched = run.events[0]
-    impulses = {name: 1.01 * wrench for name, wrench in latched.impulses.items()}
     changes = {
-        "impulse_error": {"impulses": impulses},
+        "impulse_error": {"impulses": {name: 1.01 * wrench for name, wrench in latched.impulses.items()}},
         "impact_error": {"velocity_after": 1.1 * latched.velocity_after},
         "impact_energy_error": {"energy_after": 1.1 * latched.energy_after},
     }
@@ -120,6 +100,14 @@ def test_wrong_impacts_are_measured():
         assert measure(scene, wrong)[name] > 1e-3
 
 
-def test_engines_without_intervals_refuse_them_by_name():
-    refused = {name: engine(name).cannot(carts()) for name in BUILT_IN if name != "mbref"}
-    assert refused and all("joint[L].active has intervals" in str(why) for why in refused.values())
+@pytest.mark.parametrize("make", [carts, rotors, caught])
+def test_mujoco_switches_equalities_and_other_engines_refuse_by_name(make):
+    scene, times = make(), np.linspace(0.0, make().duration, 5)
+    run = engine("mujoco").run(scene, times, Setting("tuned", {"step": 1e-3, "beta": 50.0, "hard": 1e-7}))
+    exact = motion_by(natural_motion, scene, times, EXTENDED)
+    assert np.abs(run.position - doubles(exact.position)).max() <= 1e-8
+    assert measure(scene, run)["impact_error"] <= ROUNDING
+    for name in ("pinocchio", "exudyn"):
+        assert "active has intervals" in str(engine(name).cannot(scene))
+    hinged = carts(type="revolute", anchor=[0, 0, 0], axis=[0, 0, 1])
+    assert "joint 'L' of type 'revolute' has intervals" in str(engine("mujoco").cannot(hinged))
