@@ -3,6 +3,7 @@
 from crosscheck.engines.shared.compiled import run as integrators
 from mbref.kernels.compilation import prepare_all
 from mbref.method import Method
+from mbref.stabilisation.all_coordinates import rates_and_balance
 from mbref.stepping.preparation import kernels_of
 from mbref.taylor.driven import follow_drivers
 from mbref.taylor.preparation import KERNELS_OF_SERIES
@@ -23,7 +24,8 @@ def prepare(backwards: bool = False) -> None:
     """Compile or load the kernels of METHODS and of the series. Processes that begin at the two ends share
     the work."""
     general = dict.fromkeys(kernel for name in METHODS for kernel in kernels_of(Method.parse(name)))
-    kernels = [*general, *KERNELS_OF_SERIES, follow_drivers]
+    # rates_and_balance: runs by a sparse formulation with redundant rows, without projection
+    kernels = [*general, *KERNELS_OF_SERIES, follow_drivers, rates_and_balance]
     prepare_all(kernels[::-1] if backwards else kernels)
 
 
