@@ -104,10 +104,11 @@ class Opening:
 
 @dataclass(frozen=True)
 class Moving:
-    """Animated mechanisms side by side: title and SVG of each."""
+    """Mechanisms side by side, animated unless ``is_still``: title and SVG of each."""
 
     caption: str
     panels: Sequence[tuple[str, str]]
+    is_still: bool = False
 
 
 @dataclass(frozen=True)

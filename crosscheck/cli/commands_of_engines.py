@@ -16,14 +16,17 @@ from crosscheck.cli.options import (
 )
 from crosscheck.engines.loaders import PLACES
 from crosscheck.study.grid import MOST_SECONDS
-from mbref.command_line import add_output, number, whole
+from mbref.command_line import add_output, number, output_folder, whole
 
 READER_LIMIT = 120.0  # s of CPU time of a reader of files, imports and compilation included
 
 
 def add_findings(commands: Commands) -> None:
     """Add the parser of `crosscheck findings`."""
-    about = "violations found in engines, each with a proof; --recheck asks the installed versions"
+    about = (
+        "violations found in engines, each with a proof, and readers of files that differ from the formats; "
+        "--recheck asks the installed versions"
+    )
     parser = add_command(commands, "findings", about, "crosscheck findings --recheck")
     parser.add_argument("name", nargs="*", metavar="NAME", help="a finding; default: all")
     parser.add_argument(
@@ -53,7 +56,8 @@ def add_files(commands: Commands) -> None:
     about = (
         "read one MJCF, URDF or SDF file by the own reader of each engine, and show which machine each one "
         "built, against the specification of the format: bodies, joints, loops, couplings, gravity, and the "
-        "engine's own mass matrix, gravity torques and accelerations at four poses. A grade says `the same "
+        "engine's own mass matrix, gravity torques, constraint rows and accelerations at four poses, and its "
+        "motion of 0.1 s. A grade says `the same "
         "machine`, `the same except for` limits or forces of joints, `another machine`, or `cannot read`. "
         "Changes of the file that help a reader are tried and named. Each reader runs in a process of its "
         "own. Exit status: 0 if all readers build the file's machine, 1 if one does not, 2 for a faulty file"
@@ -75,7 +79,11 @@ def add_files(commands: Commands) -> None:
     )
     parser.add_argument("--install", action="store_true", help=about)
     parser.add_argument("--run", action="store_true", help="measure the stored table again, or readers of it")
+    about = "the table of public files of robots in packages, which --run downloads with pip"
+    parser.add_argument("--public", action="store_true", help=about)
     add_output(parser, "--page", metavar="FILE", help="also write the table as a page in Markdown")
+    about = "also write the result of ROBOT as a page, DIR/index.html, with pictures of other machines"
+    parser.add_argument("--out", type=output_folder, metavar="DIR", help=about)
     about = "do not try changes of the file that let more readers build its machine"
     parser.add_argument("--no-advice", action="store_true", help=about)
     about = "CPU time of a reader; default: %(default)g"

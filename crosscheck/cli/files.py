@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import json
+import math
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,11 +16,11 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from crosscheck.cli.rendering import write_page
+from crosscheck.cli.rendering import rendered, write_page
 from crosscheck.cli.request import RequestError
 from crosscheck.cli.running import COMPLETED, OTHERWISE, console, notice, print_json
 from crosscheck.engines.loaders import PLACES
-from crosscheck.files import records
+from crosscheck.files import public, records
 from crosscheck.files.corpus import CASES
 from crosscheck.files.meaning import SOURCES
 from crosscheck.files.readers import UnknownReader, found_readers
@@ -46,14 +49,14 @@ def files(arguments: argparse.Namespace) -> int:
     Without a file print the stored table of features and readers.
     """
     try:
-        return _of_file(arguments) if arguments.robot else _of_corpus(arguments)
+        return _of_file(arguments) if arguments.robot else _of_table(arguments)
     except (UnknownReader, NotInstalled) as reason:
         raise RequestError(str(reason)) from None
 
 
 def _of_file(arguments: argparse.Namespace) -> int:
-    if arguments.run or arguments.page:
-        raise RequestError("--run and --page are about the stored table; leave out ROBOT")
+    if arguments.run or arguments.page or arguments.public:
+        raise RequestError("--run, --page and --public are about a stored table; leave out ROBOT")
     file = file_of(Path(arguments.robot))
     chosen, left_out = found_readers(arguments.engine or (), file.form, arguments.install)
     for name, why in left_out:
@@ -66,27 +69,50 @@ def _of_file(arguments: argparse.Namespace) -> int:
         pairs = list(zip(chosen, found, strict=True))
         tried = [] if arguments.no_advice else advice(file, pairs, arguments.time_limit, say)
         done("advice")
+    result = document(file, found, tried)
     if arguments.json:
-        print_json([document(file, found, tried)])
+        print_json([result])
     else:
         _show(console(), file, found, tried)
+    if arguments.out and (status := _write_report(result, arguments.out)):
+        return status
     return COMPLETED if all(reading.grade == SAME for reading in found) else OTHERWISE
 
 
-def _of_corpus(arguments: argparse.Namespace) -> int:
+def _write_report(result: dict[str, Any], folder: str) -> int:
+    """Write the page of a result; return the exit status."""
+    with tempfile.TemporaryDirectory(prefix="crosscheck-") as place:
+        path = Path(place) / "files.json"
+        path.write_text(json.dumps(result), encoding="utf-8")
+        return rendered([str(path), f"--out={folder}"], ".robot_files")
+
+
+def _of_table(arguments: argparse.Namespace) -> int:
+    table, page = (public, "real-files") if arguments.public else (records, "files")
+    number = sum(map(len, public.COLLECTIONS.values())) if arguments.public else len(CASES)
     if arguments.run:
-        most = len(CASES) * len(arguments.engine or PLACES)
+        most = number * len(arguments.engine or PLACES)
         with counted("reading, at most", most) as advance:
-            new = records.measured(arguments.engine or (), arguments.install, arguments.time_limit, advance)
-        rewrite(records.FILE, records.merged(new, records.read()))
-    if status := write_page("files", records.FILE, arguments.page):
+            new = table.measured(arguments.engine or (), arguments.install, arguments.time_limit, advance)
+        rewrite(table.FILE, table.merged(new, table.read()))
+    if status := write_page(page, table.FILE, arguments.page):
         return status
-    found = records.read()
+    found = table.read()
     if arguments.json:
         print_json([{"records": found}])
+    elif arguments.public:
+        _show_public(console(), found)
     else:
         _show_corpus(console(), found)
     return COMPLETED
+
+
+def _show_public(out: Console, found: Sequence[records.Record]) -> None:
+    table = Table("package", "file", "reader", "grade", "differences", box=SIMPLE)
+    for record in found:
+        cells = record["package"], record["path"], record["reader"], record["grade"], record["words"]
+        table.add_row(*map(Text, cells))
+    out.print(table)
 
 
 def _show_corpus(out: Console, found: Sequence[records.Record]) -> None:
@@ -104,7 +130,21 @@ def _show_corpus(out: Console, found: Sequence[records.Record]) -> None:
 
 
 def document(file: File, found: Sequence[Reading], tried: Sequence[Advice]) -> dict[str, Any]:
-    """Return the JSON document of a file."""
+    """Return the JSON document of a file; null is no limit, or a number that the reader does not give."""
+    made: dict[str, Any] = _finite(_document(file, found, tried))
+    return made
+
+
+def _finite(value: Any) -> Any:
+    """Return a document with null for numbers that are not finite, which JSON does not have."""
+    if isinstance(value, dict):
+        return {key: _finite(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _document(file: File, found: Sequence[Reading], tried: Sequence[Advice]) -> dict[str, Any]:
     return {
         "file": str(file.path),
         "format": file.form,

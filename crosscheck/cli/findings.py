@@ -10,14 +10,19 @@ from rich.console import Console
 from rich.table import Table
 
 from crosscheck.cli.request import RequestError
+from crosscheck.files.rechecks import Cells, cells
 from crosscheck.findings.finding import Finding, findings
 from crosscheck.study.progress import counted
 from mbref.scene.fields import meant
 
 
-def chosen(names: Sequence[str]) -> list[Finding]:
-    """Return the findings of the given names, or all findings; raises RequestError for an unknown name."""
-    known = {found.name: found for found in findings()}
+def chosen(names: Sequence[str]) -> list[Finding | Cells]:
+    """Return the findings of the given names, or all; raises RequestError for an unknown name.
+
+    A reader of robot files that differs from the formats is a finding too, such as ``files-drake``.
+    """
+    known: dict[str, Finding | Cells] = {found.name: found for found in findings()}
+    known |= cells()
     if faults := [
         f"unknown finding {name!r}; known: {', '.join(known)}{meant(name, known)}"
         for name in names
@@ -32,12 +37,17 @@ def show(console: Console, names: Sequence[str], recheck: bool) -> None:
     wanted = chosen(names)
     columns = ["finding", "engine", "found in", "what it does"]
     table = Table(*columns, *(["installed", "status", "measured"] if recheck else []), box=SIMPLE)
-    with counted("running proofs", len(wanted) if recheck else 0) as advance:
+    files = [len(found.all) for found in wanted if isinstance(found, Cells)]
+    proofs = sum(files) + len(wanted) - len(files)
+    with counted("running proofs", proofs if recheck else 0) as advance:
         for found in wanted:
-            cells = [found.name, found.engine, found.version, found.does]
-            if recheck:
+            row, answer = [found.name, found.engine, found.version, found.does], None
+            if recheck and isinstance(found, Cells):
+                answer = found.recheck(advance)
+            elif recheck and isinstance(found, Finding):
                 answer = found.recheck()
-                cells += [answer.version or "–", answer.status.value, answer.words]
                 advance(found.name)
-            table.add_row(*cells)
+            if answer is not None:
+                row += [answer.version or "–", answer.status.value, answer.words]
+            table.add_row(*row)
     console.print(table)

@@ -22,6 +22,7 @@ from crosscheck.files.statics import moving_bodies, statics_of
 SPEED, SEED = 1.0, 11  # largest rates: rad/s, and machine's sizes per s
 MOST = 60  # joints; the motion of a machine with more takes seconds
 REGULAR = 1e-4  # smallest singular value of independent rows / largest one, away from singular positions
+MASSIVE = 1e-10  # least eigenvalue of a mass matrix with a unit diagonal; less is rounding of a massless link
 RTOL = 1e-9  # relative tolerance of the motion
 
 
@@ -56,7 +57,7 @@ def _rank(machine: Machine, pose: Pose, size: float) -> int:
 
 def states_of(machine: Machine, poses: Sequence[Pose], size: float, gravity: Vector) -> list[State]:
     """Return a state with random rates at each pose; none for a machine with other joints than hinges and
-    slides, or with constraints whose rows are unknown."""
+    slides, with a joint that moves no mass, or with constraints whose rows are unknown."""
     moving = [joint for joint in machine.joints if joint.type != FIXED]
     if not 0 < len(moving) <= MOST or any(joint.type not in SCALAR for joint in moving) or unknown(machine):
         return []
@@ -67,7 +68,15 @@ def states_of(machine: Machine, poses: Sequence[Pose], size: float, gravity: Vec
         rates = {name: float(random.uniform(-m, m)) for name, m in most.items()}
         rates = projected(machine, pose, rates, size) if held else rates
         found.append(state_at(machine, pose, rates, size, gravity))
-    return found
+    return found if all(_moves(state.mass) for state in found) else []
+
+
+def _moves(mass: np.ndarray) -> bool:
+    """Return whether a mass matrix is regular: each joint moves some mass."""
+    sizes = np.sqrt(np.diag(mass))
+    if not np.all(sizes > 0.0):
+        return False
+    return bool(np.linalg.eigvalsh(mass / np.outer(sizes, sizes))[0] > MASSIVE)
 
 
 def state_at(machine: Machine, pose: Pose, rates: Pose, size: float, gravity: Vector) -> State:

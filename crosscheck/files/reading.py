@@ -91,7 +91,8 @@ class Reading:
     """A reader's result: version, machine and differences, or the reason of a refusal.
 
     ``messages`` are lines that the reader printed, and ``unknown`` is why a quantity is not compared.
-    ``convention`` is a choice that the format leaves open, in a sentence.
+    ``seconds`` is the CPU time of reader and comparison. ``convention`` is a choice that the format leaves
+    open, in a sentence.
     """
 
     reader: str
@@ -100,7 +101,7 @@ class Reading:
     differences: tuple[Difference, ...]
     refusal: str
     messages: tuple[str, ...]
-    seconds: float
+    seconds: float = 0.0
     unknown: Mapping[str, str] = field(default_factory=dict)
     convention: str = ""
 
@@ -134,7 +135,7 @@ def read(reader: Reader, file: File, time_limit: float) -> Reading:
 
 def read_in(child: Child, reader: Reader, file: File, time_limit: float) -> Reading:
     """Return the reading of a file in a child process, which has ended if the file is refused."""
-    began, of_reader = time.monotonic(), loader(reader.name)
+    began, of_reader = time.process_time(), loader(reader.name)
     asked = reader.name, file.path.resolve(), file.form, file.asked
     try:
         seen = child.call(_built, asked, time_limit)
@@ -142,16 +143,19 @@ def read_in(child: Child, reader: Reader, file: File, time_limit: float) -> Read
         version = of_reader.installed() if reader.python is None else of_reader.version
         said = " ".join(COLOURS.sub("", str(failure)).split())
         reason = re.sub(r"^(?:[\w.]*\bSceneError: |(?:\w+\.)+(?=\w+: ))", "", said)
-        return Reading(of_reader.name, version, None, (), reason, (), time.monotonic() - began)
-    return _compared(of_reader, file, seen.value, seen.printed, time.monotonic() - began)
+        return Reading(of_reader.name, version, None, (), reason, (), time.process_time() - began)
+    found, seconds = seen.value
+    reading = _compared(of_reader, file, found, seen.printed)
+    return replace(reading, seconds=seconds + time.process_time() - began)
 
 
-def _built(name: str, path: Path, form: str, asked: Asked) -> Built:
-    """Return what a loader built; called in the child."""
-    return built(loader(name), path, form, asked)
+def _built(name: str, path: Path, form: str, asked: Asked) -> tuple[Built, float]:
+    """Return what a loader built, and its CPU time (s); called in the child."""
+    began = time.process_time()
+    return built(loader(name), path, form, asked), time.process_time() - began
 
 
-def _compared(of_reader: Loader, file: File, found: Built, printed: str, seconds: float) -> Reading:
+def _compared(of_reader: Loader, file: File, found: Built, printed: str) -> Reading:
     match = matched(file.machine, found.machine, of_reader.tolerance)
     lines = [line.strip() for line in COLOURS.sub("", printed).splitlines() if line.strip()]
     messages = (*found.machine.messages, *lines)
@@ -162,7 +166,6 @@ def _compared(of_reader: Loader, file: File, found: Built, printed: str, seconds
         tuple(differences(match, file, found, of_reader.tolerance)),
         refusal="",
         messages=messages,
-        seconds=seconds,
         unknown=found.faults,
         convention=of_reader.convention,
     )

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 import venv
+import zipfile
 from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
@@ -70,6 +71,24 @@ def existing(wanted: Requirement) -> Path | None:
     """Return the Python interpreter of the environment of a version; None if it was not made before."""
     place = _place(wanted)
     return _python(place) if place.exists() else None
+
+
+def unpacked(wanted: Requirement) -> Path:
+    """Return the folder with the files of a package's wheel, which pip downloads if it is missing.
+
+    Nothing is installed or run. Raises NotInstalled.
+    """
+    place = cache("wheels") / f"{wanted.package}-{wanted.version}"
+    if not place.exists():
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=place.parent, prefix="making-") as made:
+            _pip("download", "--no-deps", "--only-binary=:all:", "--dest", made, str(wanted))
+            (wheel,) = Path(made).glob("*.whl")
+            with zipfile.ZipFile(wheel) as files:
+                files.extractall(Path(made) / "files")
+            if not place.exists():  # another process may have made it meanwhile
+                (Path(made) / "files").rename(place)
+    return place
 
 
 def _place(wanted: Requirement) -> Path:

@@ -17,6 +17,7 @@ from ..markdown import body
 
 NAMES = (
     *("which-engine", "closed-loops", "convergence", "invariants", "alternatives", "small-motions", "files"),
+    "real-files",
     *("findings", "support"),
 )
 TEMPLATES = Path(__file__).parents[1] / "templates"  # texts of the pages, with names of parts in braces

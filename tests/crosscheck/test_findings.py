@@ -8,6 +8,7 @@ import pytest
 from crosscheck.cli.commands import main
 from crosscheck.cli.findings import chosen
 from crosscheck.cli.request import RequestError
+from crosscheck.files.corpus import CASES
 from crosscheck.findings.finding import FOLDER, Finding, Status, findings
 from mbref.scene import Scene
 
@@ -66,3 +67,19 @@ def test_the_command_rechecks_a_finding_and_prints_its_status(capsys: pytest.Cap
     pytest.importorskip("dartpy")
     assert main(["findings", "dart-hinge-closure-turned", "--recheck"]) == 0
     assert re.search(r"dart.*present", capsys.readouterr().out, re.DOTALL)
+
+
+def test_readers_of_files_are_findings_and_our_own_import_is_not(capsys: pytest.CaptureFixture[str]) -> None:
+    """The cells of a reader are one finding: PyBullet refuses or changes most small files."""
+    assert main(["findings", "files-bullet"]) == 0
+    number, count = map(int, re.findall(r"in (\d+) of (\d+)", " ".join(capsys.readouterr().out.split()))[0])
+    assert 50 < number < count == len(CASES)
+    with pytest.raises(RequestError, match="unknown finding 'files-mbref'"):
+        chosen(["files-mbref"])
+
+
+@pytest.mark.slow
+def test_cells_of_mujoco_are_read_again_and_none_has_changed(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("mujoco")
+    assert main(["findings", "files-mujoco", "--recheck"]) == 0
+    assert re.search(r"mujoco.*present.*changed: none", " ".join(capsys.readouterr().out.split()))

@@ -225,7 +225,10 @@ class Imported(Loaded):
         positions = np.array([place.position for place in places])
         turns = np.array([rotations.from_matrix(place.turn) for place in places])
         twists = (self._columns(posed) @ v).reshape(-1, 6)
-        begun = restarted(scene.with_(gravity=tuple(gravity)), positions, turns, twists, values)
+        # the start obeys the couplings, whose coordinates count from it
+        obeyed = [coupling.model_copy(update={"offset": 0.0}) for coupling in scene.coupling]
+        scene = scene.with_(gravity=tuple(gravity), coupling=obeyed)
+        begun = restarted(scene, positions, turns, twists, values)
         from crosscheck.engines.mbref import ENGINE
 
         return ENGINE.run(begun, times, ENGINE.best_settings(begun)[-1])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
@@ -13,6 +14,11 @@ import numpy as np
 from mbref.scene import SceneError
 
 DEEPEST = 200  # elements inside each other; robots need about ten, and Python's recursion ends near 1000
+NAME = rb"[A-Za-z_][\w.-]*"
+PREFIX = re.compile(rb"(?:</?|\s)(" + NAME + rb"):" + NAME + rb"(?=\s|/|>|=)")  # of a tag or an attribute
+DECLARED = re.compile(rb"\sxmlns:(" + NAME + rb")\s*=")
+PROLOG = rb"\A(?:\xef\xbb\xbf|\s|<\?(?:(?!\?>).)*\?>|<!--(?:(?!-->).)*-->|<!(?!--)[^>\[]*>)*"
+ROOT = re.compile(PROLOG + b"<" + NAME, re.DOTALL)  # up to the name of the first element
 SHOWN = 6  # names in a sentence
 ROUNDED = 1e-9  # relative excess of the largest moment of inertia: the rounding of a flat body's moments
 
@@ -24,7 +30,11 @@ def parsed(path: Path) -> ET.Element:
 
 
 def parsed_bytes(text: bytes, where: str) -> ET.Element:
-    """Return the root element of an XML text; ``where`` begins the sentence of a SceneError."""
+    """Return the root element of an XML text; ``where`` begins the sentence of a SceneError.
+
+    Prefixes such as ``drake:`` need no declaration, as in the parsers of engines, which know no namespaces.
+    """
+    text = _declared(text)
     root: ET.Element | None = None
     deepest = depth = 0
     try:
@@ -39,6 +49,13 @@ def parsed_bytes(text: bytes, where: str) -> ET.Element:
     if deepest > DEEPEST:
         raise SceneError([f"{where}: its elements are nested {deepest} deep; at most {DEEPEST} are read"])
     return root
+
+
+def _declared(text: bytes) -> bytes:
+    """Return an XML text whose first element declares each prefix that no element declares."""
+    missing = set(PREFIX.findall(text)) - set(DECLARED.findall(text)) - {b"xml", b"xmlns"}
+    given = b"".join(b' xmlns:%b="%b"' % (prefix, prefix) for prefix in sorted(missing))
+    return ROOT.sub(lambda begin: begin[0] + given, text, count=1) if missing else text
 
 
 def unread(root: ET.Element, known: Mapping[str, Collection[str]]) -> Iterator[str]:

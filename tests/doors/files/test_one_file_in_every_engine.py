@@ -28,6 +28,8 @@ from crosscheck.files.merged import size_of
 from crosscheck.files.reading import differences, file_of, since
 from crosscheck.files.statics import poses
 from crosscheck.files.statics_differences import of_statics
+from reports.blocks import Moving
+from reports.robot_files import blocks
 
 ROUNDING = 1e-12  # m, rad, kg, kg m² of numbers near one, after some rotations
 NOT_OURS = ("spring polynomial", "damping polynomial", "coupling polynomial")
@@ -223,7 +225,11 @@ def test_verdict_names_what_is_dropped_and_whether_the_reader_says_so(tmp_path: 
     text = case.text.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><dynamics friction="0.2"/>', 1)
     path = written(tmp_path, text, "robot.urdf")
     assert main(["files", str(path), "--engine", f"{READERS}:Uncoupled", "--json"]) == 1
-    (found,) = json.loads(capsys.readouterr().out)["readers"]
+    document = json.loads(capsys.readouterr().out)
+    (found,) = document["readers"]
+    (pictures,) = [block for block in blocks(document) if isinstance(block, Moving)]
+    assert [title for title, _ in pictures.panels] == ["the file", "uncoupled"]
+    assert all(f">{name}<" in pictures.panels[1][1] for name in ("shoulder", "elbow", "wrist"))
     assert found["grade"] == "another machine" and found["messages"] == [
         "mimic of joint 'wrist' is not supported"
     ]

@@ -98,3 +98,11 @@ def test_inertia_of_a_flat_link_is_read_though_rounding_makes_it_impossible(file
     moments = f'ixx="0.1" ixy="0" ixz="0" iyy="{0.3 * (1 + excess)!r}" iyz="0" izz="0.2"'
     scene, _ = files.scene(robot(*CRANKS).replace(MOMENTS, moments, 1), "r.urdf")
     assert np.diag(scene.body[0].inertia) == pytest.approx(np.diag([0.1, 0.3, 0.2]), rel=1e-8, abs=1e-8)
+
+
+def test_prefix_without_a_declaration_is_read_as_by_parsers_without_namespaces(files):
+    """Robots have elements and attributes of tools, such as ``drake:``; the comment is no element."""
+    limit = '<limit tool:acceleration="2" effort="1" velocity="1"/>'
+    text = robot(hinge("ja", "base", "a", "0 0 0", more=limit), *CRANKS[1:], '<tool:group name="g"/>')
+    scene, _ = files.scene(f"<!-- a <tool:note> -->{text}", "r.urdf")
+    assert scene == files.scene(text.replace("tool:", "").replace("<group", "<gazebo"), "r.urdf")[0]

@@ -1,0 +1,86 @@
+"""The page on public files of robots: which machine each reader makes of each file."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from crosscheck.files.public import COLLECTIONS, FAULTY, FILE, Record, read
+from crosscheck.files.reading import ALMOST, ANOTHER, REFUSED, SAME
+
+from ..blocks import Fold, Marked, Parts, Table, listing
+
+SIGNS = {SAME: "✓", ALMOST: "except", ANOTHER: "**another**", REFUSED: "refused"}
+GRADES = tuple(SIGNS)
+
+
+def parts(records: Path = FILE) -> Parts:
+    """Return the parts of the page from the records in a file."""
+    found = [record for record in read(records) if record["reader"]]
+    names = list(dict.fromkeys(record["reader"] for record in found))
+    order = [name for name in dict.fromkeys(r["reader"] for r in sorted(found, key=_place)) if name in names]
+    files = [(package, path) for package, paths in COLLECTIONS.items() for path in paths]
+    faulty = [record for record in read(records) if record["grade"] == FAULTY]
+    lines = [f"{_label(r)}, {r['reader']}: {r['grade']}: {r['words']}" for r in found if r["grade"] != SAME]
+    lines += [f"{_label(record)}: {FAULTY}: {record['words']}" for record in faulty]
+    return {
+        "number": str(len(files)),
+        "packages": str(len(COLLECTIONS)),
+        "counts": [_counts(found, order)],
+        "files": [_files(found, order, files)],
+        "causes": [_causes(found, order)],
+        "seconds": _seconds(found),
+        "numbers": [Fold("Files: differences behind the cells", "differences", listing(lines))],
+    }
+
+
+def _place(record: Record) -> int:
+    from crosscheck.engines.loaders import PLACES
+
+    return list(PLACES).index(record["reader"])
+
+
+def _label(record: Record) -> str:
+    return f"{record['package'].partition('==')[0]} {record['path'].rpartition('share/')[2]}"
+
+
+def _counts(found: Sequence[Record], names: Sequence[str]) -> Table:
+    rows = []
+    for name in names:
+        own = [record for record in found if record["reader"] == name]
+        counts = [str(sum(record["grade"] == grade for record in own)) for grade in GRADES]
+        rows.append((name, own[-1]["version"], *counts, f"{max(record['seconds'] for record in own):.1f}"))
+    header = ("reader", "version", *GRADES, "most CPU s")
+    return Table("Public files by grade.", header, rows, frozenset(range(2, 3 + len(GRADES))))
+
+
+def _files(found: Sequence[Record], names: Sequence[str], files: Sequence[tuple[str, str]]) -> Table:
+    cells = {(r["package"], r["path"], r["reader"]): Marked(SIGNS[r["grade"]]) for r in found}
+    rows = []
+    for package, path in files:
+        *_, folder, name = path.split("/")
+        label = f"{folder}/{name}" if name.startswith(("model.", "robot.")) else name
+        own = [cells.get((package, path, reader), "") for reader in names]
+        rows.append((package.partition("==")[0], label, *own))
+    return Table("Public files and readers.", ("package", "file", *names), rows)
+
+
+def _causes(found: Sequence[Record], names: Sequence[str]) -> Table:
+    """Return the differences of each reader by the number of files that have them."""
+    rows = []
+    for name in names:
+        own = [record for record in found if record["reader"] == name]
+        counts = Counter(cause for record in own for cause in record["causes"])
+        rows += [(name, cause, str(count)) for cause, count in counts.most_common()]
+    return Table(
+        "Differences by the number of files.", ("reader", "difference", "files"), rows, frozenset({2})
+    )
+
+
+def _seconds(found: Sequence[Record]) -> str:
+    """Return the largest sum of CPU times of one file."""
+    sums = Counter[tuple[str, str]]()
+    for record in found:
+        sums[record["package"], record["path"]] += record["seconds"]
+    return f"{max(sums.values()):.0f}"
