@@ -135,6 +135,7 @@ COLLECTIONS: Mapping[str, Sequence[str]] = {  # package and version → files in
     ),
 }
 LONGEST = 400  # characters of a record's words
+READERS = tuple(PLACES)  # in the order of tables
 FAULTY = "faulty file"  # grade of a file that its format's specification does not allow, or MuJoCo for MJCF
 Record = dict[str, Any]
 

@@ -48,9 +48,9 @@ class Reader:
 
 @dataclass(frozen=True)
 class File:
-    """A file with its format, its meaning, and what engines are asked.
+    """A file with its format, its meaning, and the questions to engines.
 
-    ``states`` has each state of ``asked`` with the machine's terms; the motion begins at the last one.
+    ``states`` have the machine's terms; the motion begins at the last one.
     """
 
     path: Path

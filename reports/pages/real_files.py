@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from crosscheck.files.public import COLLECTIONS, FAULTY, FILE, Record, read
+from crosscheck.files.public import COLLECTIONS, FAULTY, FILE, READERS, Record, read
 from crosscheck.files.reading import ALMOST, ANOTHER, REFUSED, SAME
 
 from ..blocks import Fold, Marked, Parts, Table, listing
@@ -18,8 +18,7 @@ GRADES = tuple(SIGNS)
 def parts(records: Path = FILE) -> Parts:
     """Return the parts of the page from the records in a file."""
     found = [record for record in read(records) if record["reader"]]
-    names = list(dict.fromkeys(record["reader"] for record in found))
-    order = [name for name in dict.fromkeys(r["reader"] for r in sorted(found, key=_place)) if name in names]
+    order = [name for name in READERS if any(record["reader"] == name for record in found)]
     files = [(package, path) for package, paths in COLLECTIONS.items() for path in paths]
     faulty = [record for record in read(records) if record["grade"] == FAULTY]
     lines = [f"{_label(r)}, {r['reader']}: {r['grade']}: {r['words']}" for r in found if r["grade"] != SAME]
@@ -33,12 +32,6 @@ def parts(records: Path = FILE) -> Parts:
         "seconds": _seconds(found),
         "numbers": [Fold("Files: differences behind the cells", "differences", listing(lines))],
     }
-
-
-def _place(record: Record) -> int:
-    from crosscheck.engines.loaders import PLACES
-
-    return list(PLACES).index(record["reader"])
 
 
 def _label(record: Record) -> str:
@@ -61,7 +54,7 @@ def _files(found: Sequence[Record], names: Sequence[str], files: Sequence[tuple[
     for package, path in files:
         *_, folder, name = path.split("/")
         label = f"{folder}/{name}" if name.startswith(("model.", "robot.")) else name
-        own = [cells.get((package, path, reader), "") for reader in names]
+        own = [cells.get((package, path, reader), "–") for reader in names]
         rows.append((package.partition("==")[0], label, *own))
     return Table("Public files and readers.", ("package", "file", *names), rows)
 

@@ -62,7 +62,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["mechanisms", "speed_figure", "time_series"],
         ["sections"],
         ["render", "stored"],
-        ["pages"],
+        ["pages", "robot_files"],
         ["__main__", "keep"],
     ),
 }

@@ -237,6 +237,7 @@ class Compiled(Loaded):
         return {name: float(data.qpos[q] - m.qpos0[q]) for name, q in start.items()}
 
     def _put(self, pose: Pose, rates: Pose) -> None:
+        without_others(self.model)
         self.mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:], self.data.qvel[:] = self.coordinates(pose), 0.0
         for name, dof in self.dofs().items():
@@ -247,3 +248,10 @@ class Compiled(Loaded):
         whole = np.zeros((self.model.nv, self.model.nv))
         self.mujoco.mj_fullM(self.model, self.data, whole)
         return whole
+
+
+def without_others(model: Any) -> None:
+    """Set forces to zero that are not compared: of fluids, tendons and compensated weights."""
+    model.opt.density = model.opt.viscosity = 0.0
+    for strength in (model.tendon_stiffness, model.tendon_damping, model.body_gravcomp):
+        strength[:] = 0.0

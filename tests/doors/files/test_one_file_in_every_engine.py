@@ -15,6 +15,7 @@ from crosscheck.engines.loaders.loader import DOUBLE, MJCF, SDF, URDF, built
 from crosscheck.engines.loaders.machine import Machine, vector
 from crosscheck.engines.loaders.mujoco import Mujoco
 from crosscheck.engines.loaders.own import Own
+from crosscheck.files import public
 from crosscheck.files.constraints import rows_of
 from crosscheck.files.corpus import CASES
 from crosscheck.files.corpus.case import value_at
@@ -25,7 +26,7 @@ from crosscheck.files.dynamics_differences import of_rows, of_values
 from crosscheck.files.matching import matched
 from crosscheck.files.meaning import form_of, meant
 from crosscheck.files.merged import size_of
-from crosscheck.files.reading import differences, file_of, since
+from crosscheck.files.reading import ALMOST, SAME, differences, file_of, since
 from crosscheck.files.statics import poses
 from crosscheck.files.statics_differences import of_statics
 from reports.blocks import Moving
@@ -255,3 +256,13 @@ def test_faulty_file_and_unknown_reader_are_refused_in_a_sentence(tmp_path: Path
     assert "the links are no tree with one root: a, b" in capsys.readouterr().err
     assert main(["files", str(written(tmp_path, LOOP)), "--engine", "mojoco"]) == 2
     assert "did you mean 'mujoco'" in capsys.readouterr().err
+
+
+def test_own_import_reads_public_files_of_robots_or_refuses_them_by_name():
+    """At least 60 files of 12 packages, without places of the machine that read them."""
+    found = [record for record in public.read() if record["reader"] == "mbref"]
+    assert len(found) >= 60 and len({record["package"] for record in found}) >= 12
+    for record in found:
+        assert record["grade"] in (SAME, ALMOST) or record["words"], record
+        assert {*record["causes"]} <= {"limits of a joint: lost", "friction of a joint: lost"}, record
+        assert "/tmp" not in record["words"] and "without a message" not in record["words"], record

@@ -106,3 +106,12 @@ def test_prefix_without_a_declaration_is_read_as_by_parsers_without_namespaces(f
     text = robot(hinge("ja", "base", "a", "0 0 0", more=limit), *CRANKS[1:], '<tool:group name="g"/>')
     scene, _ = files.scene(f"<!-- a <tool:note> -->{text}", "r.urdf")
     assert scene == files.scene(text.replace("tool:", "").replace("<group", "<gazebo"), "r.urdf")[0]
+
+
+def test_limits_without_a_range_are_named(files):
+    """The format's default of both ends is 0, which would lock the joint; engines read it as no limit."""
+    free = hinge("ja", "base", "a", "0 0 0", more='<limit effort="1" velocity="1"/>').replace(
+        "continuous", "revolute"
+    )
+    _, out = files.scene(robot(free, *CRANKS[1:]), "r.urdf")
+    assert "limits of joints 'ja': lower and upper are 0 or missing; the joints are free" in out

@@ -144,8 +144,18 @@ def couplings(root: ET.Element) -> Iterator[Part]:
 
 
 def unread(root: ET.Element) -> Iterator[str]:
-    """Return a sentence for each kind of element that neither this reader nor MuJoCo knows."""
-    return xml_files.unread(root, KNOWN)
+    """Yield a sentence for each kind of element that neither this reader nor MuJoCo knows, and one for limits
+    without a range, which MuJoCo reads as no limits."""
+    yield from xml_files.unread(root, KNOWN)
+    joints = [joint for joint in root.iter("joint") if joint.get("type") in ("revolute", "prismatic")]
+    if names := [repr(str(joint.get("name"))) for joint in joints if _has_no_range(joint)]:
+        yield f"limits of joints {', '.join(names)}: lower and upper are 0 or missing; the joints are free"
+
+
+def _has_no_range(joint: ET.Element) -> bool:
+    """Return whether a joint has limits whose ends are 0 or missing."""
+    limit = joint.find("limit")
+    return limit is not None and not any(limit.get(end, "0").strip(" +-.0") for end in ("lower", "upper"))
 
 
 def loops(root: ET.Element, body_of: BodyOf, data: Any) -> Iterator[Closure]:
