@@ -13,6 +13,7 @@ from ..blocks import Fold, Marked, Parts, Table, listing
 
 SIGNS = {SAME: "✓", ALMOST: "except", ANOTHER: "**another**", REFUSED: "refused"}
 GRADES = tuple(SIGNS)
+LONGEST = 26  # letters of a file's name in the table
 
 
 def parts(records: Path = FILE) -> Parts:
@@ -27,7 +28,7 @@ def parts(records: Path = FILE) -> Parts:
         "number": str(len(files)),
         "packages": str(len(COLLECTIONS)),
         "counts": [_counts(found, order)],
-        "files": [_files(found, order, files)],
+        "files": [_files(found, order)],
         "causes": [_causes(found, order)],
         "seconds": _seconds(found),
         "numbers": [Fold("Files: differences behind the cells", "differences", listing(lines))],
@@ -48,15 +49,22 @@ def _counts(found: Sequence[Record], names: Sequence[str]) -> Table:
     return Table("Public files by grade.", header, rows, frozenset(range(2, 3 + len(GRADES))))
 
 
-def _files(found: Sequence[Record], names: Sequence[str], files: Sequence[tuple[str, str]]) -> Table:
+def _files(found: Sequence[Record], names: Sequence[str]) -> Table:
     cells = {(r["package"], r["path"], r["reader"]): Marked(SIGNS[r["grade"]]) for r in found}
-    rows = []
-    for package, path in files:
-        *_, folder, name = path.split("/")
-        label = f"{folder}/{name}" if name.startswith(("model.", "robot.")) else name
-        own = [cells.get((package, path, reader), "–") for reader in names]
-        rows.append((package.partition("==")[0], label, *own))
-    return Table("Public files and readers.", ("package", "file", *names), rows)
+    rows: list[Sequence[str]] = []
+    for package, paths in COLLECTIONS.items():
+        rows.append((Marked(f"**{package.replace('==', ' ')}**"), *[""] * len(names)))
+        for path in paths:
+            own = [cells.get((package, path, reader), "–") for reader in names]
+            rows.append((_short(path), *own))
+    return Table("Public files and readers.", ("file", *names), rows)
+
+
+def _short(path: str) -> str:
+    """Return the name of a file, with its folder if many files have the name."""
+    *_, folder, name = path.split("/")
+    label = f"{folder}/{name}" if name.startswith(("model.", "robot.", "reach.")) else name
+    return label if len(label) <= LONGEST else f"…{label[-LONGEST:]}"
 
 
 def _causes(found: Sequence[Record], names: Sequence[str]) -> Table:
