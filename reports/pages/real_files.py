@@ -11,9 +11,9 @@ from crosscheck.files.reading import ALMOST, ANOTHER, REFUSED, SAME
 
 from ..blocks import Fold, Marked, Parts, Table, listing
 
-SIGNS = {SAME: "✓", ALMOST: "except", ANOTHER: "**another**", REFUSED: "refused"}
+SIGNS = {SAME: "✓", ALMOST: "except", ANOTHER: "**other**", REFUSED: "refused"}
 GRADES = tuple(SIGNS)
-LONGEST = 26  # letters of a file's name in the table
+LONGEST = 21  # letters of a file's name in the table
 
 
 def parts(records: Path = FILE) -> Parts:
@@ -31,7 +31,7 @@ def parts(records: Path = FILE) -> Parts:
         "files": [_files(found, order)],
         "causes": [_causes(found, order)],
         "seconds": _seconds(found),
-        "numbers": [Fold("Files: differences behind the cells", "differences", listing(lines))],
+        "numbers": [Fold("Files: differences behind the cells", "numbers", listing(lines))],
     }
 
 
