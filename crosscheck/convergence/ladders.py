@@ -131,8 +131,8 @@ def climb(
 
 def _would_take(case: Case, coarser: Record) -> float:
     """Return the CPU time (s) of a run by the time of the next coarser run."""
-    if not is_completed(coarser):
-        return math.inf if coarser["outcome"] == "TIMED_OUT" else 0.0
+    if coarser["outcome"] == "TIMED_OUT":
+        return math.inf
     options, before = case.setting.options, coarser["asked"]["options"]
     return float(coarser["cost"]["seconds"] * before.get("step", 1.0) / options.get("step", 1.0))
 

@@ -8,10 +8,12 @@ from typing import NamedTuple
 
 import mbref
 from crosscheck.cli.tables import own_code
+from crosscheck.convergence import every_scene
 from crosscheck.findings.finding import findings
 from crosscheck.study.grades import Grade, Judged
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import ended, error_text, is_completed
+from crosscheck.study.store import read_runs
 from crosscheck.study.words.speed import LEVEL, SAID, title
 from mbref.motions.trajectory import Outcome
 
@@ -85,9 +87,15 @@ def parts(records: Path = REPORTS) -> Parts:
         "in_short": [_in_short(kinds)],
         "kinds": [block for kind, found in kinds for block in _section(kind, found)],
         "many": [_many(known["planar_slider_crank"])],
+        "newer_limit": f"{every_scene.TIME_LIMIT:g}",
+        "newer": [Table("Families on every built-in scene.", every_scene.SUMMARY, _newer())],
         "failures": [_failures(folders[0])],
         "level": SAID,
     }
+
+
+def _newer() -> list[tuple[str, ...]]:
+    return every_scene.summary(read_runs(every_scene.FILE))
 
 
 def judged(group: SceneRuns) -> Judged:
