@@ -57,7 +57,7 @@ def summary(records: Sequence[Record]) -> list[tuple[str, ...]]:
                 f"{len(done)} of {asked}",
                 str(right),
                 f"{median(slopes):.1f}" if slopes else "",
-                f"{1e6 * median(steps):.2g} µs",
+                f"{float(f'{1e6 * median(steps):.2g}'):g} µs",
             )
         )
     return lines
