@@ -76,9 +76,7 @@ def test_json_of_a_run_has_the_fields_of_a_record_and_the_engines_states(capsys,
 
 def two_blocks(folder: Path) -> str:
     """Save a scene of two bodies at rest, of which no closed form is known."""
-    return saved(
-        folder, "two", body=[rod(n, (1.0, y, 3.0), inertia=1.0) for n, y in (("a", 0.0), ("b", 2.0))]
-    )
+    return saved(folder, "two", body=[rod(n, (1.0, y, 3.0), inertia=1.0) for n, y in (("a", 0), ("b", 2.0))])
 
 
 @pytest.fixture

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from crosscheck.cli.scene_request import find_scenes
-from crosscheck.engine import Setting, engine
+from crosscheck.engine import engine
 from crosscheck.study.search.offers import of_file
 from mbref.formats import ImportOptions
 from mbref.motions.trajectory import Outcome
-from mbref.scene import Scene
 from mbref.scenes import SCENES
 from tests.crosscheck.driven_arm import ENGINES, able, coarsest, driven_arm
 
@@ -37,9 +36,7 @@ def test_cost_of_a_run_is_cpu_time_of_building_and_of_stepping(name, part, monke
         assert ticks(name, scene, setting, monkeypatch) == expected, setting
 
 
-def ticks(
-    name: str, scene: Scene, setting: Setting, patch: pytest.MonkeyPatch
-) -> tuple[float | None, float | None]:
+def ticks(name, scene, setting, patch):
     """Return the costs of building and stepping by a clock of CPU time that ticks 1 s at each reading."""
     clock = itertools.count(1)
     with patch.context() as patched:

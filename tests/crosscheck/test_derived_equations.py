@@ -98,19 +98,13 @@ def test_no_symbolic_equations_are_derived_for_free_bodies_drivers_and_forces(pa
 
 # --- Forces on bodies -------------------------------------------------------------------------------------
 HALF = math.sqrt(0.5)
-TURNED = Body(
-    name="b", mass=2.0, inertia=(1.0, 2.0, 3.0), position=(1.0, 0.0, 0.0), orientation=(HALF, 0.0, 0.0, HALF)
-)
+TURNED = Body(name="b", mass=2, inertia=(1, 2, 3), position=(1, 0, 0), orientation=(HALF, 0, 0, HALF))
 HINGE = Revolute(name="H", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 2.0))
 
 
-def forces(
-    load: Any, omega: Any = (0.0, 0.0, 0.0), v: Any = (0.0, 0.0, 0.0), angle: float = 0.0
-) -> np.ndarray:
+def forces(load, omega=(0.0, 0.0, 0.0), v=(0.0, 0.0, 0.0), angle=0.0):
     """Force (world) and moment (body axes) on a body that is turned by a quarter turn about z."""
-    scene = Scene(
-        name="s", body=(TURNED,), joint=(HINGE,), load=(load,), gravity=(0.0, 0.0, 0.0), duration=1.0
-    )
+    scene = Scene(name="s", body=(TURNED,), joint=(HINGE,), load=(load,), gravity=(0, 0, 0), duration=1)
     found = Forces(scene)
     at = body_frames(
         np.array([[1.0, 0.0, 0.0]]), np.array([TURNED.orientation]), np.array([v]), np.array([omega], float)

@@ -39,8 +39,6 @@ def test_an_engine_in_the_working_directory_is_found(tmp_path, monkeypatch) -> N
 
 def test_the_example_engine_imports_from_crosscheck_engine_alone() -> None:
     """Its other imports, by ``import``, are numpy and the standard library."""
-    found = {
-        node.module for node in ast.walk(ast.parse(TINY.read_text())) if isinstance(node, ast.ImportFrom)
-    }
+    found = {n.module for n in ast.walk(ast.parse(TINY.read_text())) if isinstance(n, ast.ImportFrom)}
     assert found == {"crosscheck.engine"}, found
     assert all(hasattr(engine, name) for name in engine.__all__)

@@ -81,9 +81,7 @@ def test_jacobian_is_finite_difference_of_closure(kind, bodies, driven):
     j, b = constraints.jacobian(scene, 0.0, *motion[:2])
     direction = np.random.default_rng(5).normal(size=(len(scene.body), 6))
     ends = [moved((*motion[:2], direction[:, :3], direction[:, 3:]), 0 * rates, s * H)[:2] for s in (1, -1)]
-    plus, minus = (
-        constraints.closure(scene, s * H, *pose)["j"] for s, pose in zip((1, -1), ends, strict=True)
-    )
+    plus, minus = (constraints.closure(scene, s * H, *pose)["j"] for s, pose in ((1, ends[0]), (-1, ends[1])))
     difference, predicted = (plus - minus) / (2 * H), j @ direction.ravel() - b
     assert np.abs(difference - predicted).max() < SLOPE, f"{kind}: {difference} against {predicted}"
 
@@ -127,9 +125,7 @@ def test_initial_velocities_that_are_not_given_minimise_the_kinetic_energy():
     p / m and ω = p r / I, with m = 2 kg, I = 0.4 kg m² and the tip r = 0.5 m from the centre. The tip's own
     mass, 1e-9 kg, changes them by less than 1e-8."""
     rod = Body(name="rod", mass=2.0, inertia=(0.3, 0.3, 0.4), position=(0.5, 0.0, 0.0))
-    tip = Body(
-        name="tip", mass=1e-9, inertia=(1e-12,) * 3, position=(1.0, 0.0, 0.0), velocity=(0.0, 1.0, 0.0)
-    )
+    tip = Body(name="tip", mass=1e-9, inertia=(1e-12,) * 3, position=(1, 0, 0), velocity=(0, 1, 0))
     ball = Spherical(name="ball", bodies=("rod", "tip"), anchor=(1.0, 0.0, 0.0))
     velocity, spin = constraints.initial_twists(Scene(name="pushed", body=(rod, tip), joint=(ball,)))
     impulse = 1 / (1 / 2.0 + 0.25 / 0.4)

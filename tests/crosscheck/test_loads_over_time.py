@@ -145,12 +145,10 @@ def differences_over_limits(name: str, scene: Scene) -> float:
     return max(off / MEASURED[name][0], change_off / MEASURED[name][1]) / MARGIN
 
 
-@pytest.mark.parametrize(
-    ("name", "kind"), [("pinocchio", "sine"), ("exudyn", "table"), ("exudyn", "switched")]
-)
-def test_adapter_refuses_a_function_of_time_that_it_does_not_map(name, kind):
+@pytest.mark.parametrize(("of", "kind"), [("pinocchio", "sine"), ("exudyn", "table"), ("exudyn", "switched")])
+def test_adapter_refuses_a_function_of_time_that_it_does_not_map(of, kind):
     """Pinocchio's adapter maps none, Exudyn's polynomials only. The refusal names the load."""
-    refused = engine(name).cannot(PROBES[f"{kind} loads over time"])
+    refused = engine(of).cannot(PROBES[f"{kind} loads over time"])
     assert refused.owner is Owner.ADAPTER and "load[0]" in refused.reason
 
 

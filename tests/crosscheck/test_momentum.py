@@ -15,9 +15,7 @@ from mbref.scene import Body, Distance, Force, Moment, Revolute, Scene, Spherica
 from tests.helpers.parts import spring
 
 FIRST = Body(name="a", mass=2.0, inertia=(1.0, 1.0, 2.0), position=(0.0, 0.0, 0.0), velocity=(3.0, 0.0, 0.0))
-SECOND = Body(
-    name="b", mass=4.0, inertia=(3.0, 3.0, 5.0), position=(3.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, 2.0)
-)
+SECOND = Body(name="b", mass=4, inertia=(3, 3, 5), position=(3, 0, 0), angular_velocity=(0, 0, 2))
 PIN = Distance(name="D", bodies=("a", "b"), anchors=((0.0, 0.0, 0.0), (3.0, 0.0, 0.0)))
 SCENE = Scene(name="free", body=(FIRST, SECOND), duration=1.0)
 TIMES = np.array([0.0, 0.5, 1.0])
@@ -111,9 +109,7 @@ def test_stored_violation_states_its_numbers_and_the_command_that_repeats_it(tmp
 
 
 HINGE = Revolute(name="H", bodies=("a", "b"), anchor=(1.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
-HINGED = SCENE.with_(
-    joint=(HINGE,), gravity=(0.0, 0.0, -9.81), load=(Moment(body="a", moment=(0.0, 0.0, 1.0)),)
-)
+HINGED = SCENE.with_(joint=(HINGE,), gravity=(0, 0, -9.81), load=(Moment(body="a", moment=(0, 0, 1)),))
 
 
 def needs_b_and_gravity(smaller: Scene) -> bool:

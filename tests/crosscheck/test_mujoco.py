@@ -96,9 +96,8 @@ def test_error_of_tuned_mujoco_falls_with_the_fourth_power_of_the_step() -> None
     Steps as long as these also show terms of other orders, so that 3.5 to 5 is allowed."""
     scene = SCENES["spatial_slider_crank_driven"]()
     steps = (2e-4, 1e-4)
-    errors = [
-        completed_error(simulate(scene, 0.05, "tuned", step=h, beta=1200.0, hard=HARD), scene) for h in steps
-    ]
+    runs = (simulate(scene, 0.05, "tuned", step=h, beta=1200.0, hard=HARD) for h in steps)
+    errors = [completed_error(run, scene) for run in runs]
     order = np.log2(errors[0] / errors[1])
     assert 3.5 < order < 5, f"errors {errors} of steps {steps}: order {order:.2f}, expected 4"
 
@@ -143,9 +142,7 @@ def test_thin_disc_whose_rounded_inertia_violates_the_triangle_inequality_moves_
     """A disc has I_z = I_x + I_y, which rounding exceeds; MuJoCo refuses such bodies. The truth is the free
     body's closed form."""
     inertia = (0.1, 0.1, 0.2 * (1 + 1e-12))
-    disc = Body(
-        name="disc", mass=1.0, inertia=inertia, position=(0.0, 0.0, 0.0), angular_velocity=(0.0, 0.1, 5.0)
-    )
+    disc = Body(name="disc", mass=1, inertia=inertia, position=(0, 0, 0), angular_velocity=(0, 0.1, 5))
     scene = Scene(name="disc", body=(disc,))
     run = simulate(scene, 0.5, "tuned", step=1e-3, beta=100.0, hard=HARD)
     assert completed_error(run, scene) < MARGIN * 1.7e-13

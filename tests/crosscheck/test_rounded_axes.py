@@ -25,9 +25,7 @@ def pendulum(cosine: float) -> Scene:
     """A body on a universal joint whose second axis leans by a cosine towards the first."""
     first, across = FIRST / np.linalg.norm(FIRST), ACROSS / np.linalg.norm(ACROSS)
     second = 2.0 * (across + cosine * first)
-    joint = Universal(
-        name="U", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axes=(tuple(FIRST), tuple(second))
-    )
+    joint = Universal(name="U", bodies=("ground", "b"), anchor=(0, 0, 0), axes=(tuple(FIRST), tuple(second)))
     body = Body(name="b", mass=1.0, inertia=(0.01, 0.02, 0.03), position=(0.3, 0.1, 0.0))
     return Scene(name="u", body=(body,), joint=(joint,), gravity=(0.0, 0.0, -9.81), duration=0.2)
 

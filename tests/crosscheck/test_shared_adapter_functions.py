@@ -18,9 +18,7 @@ HINGE = Revolute(name="H", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=
 
 
 def body(name: str = "b", **parts: Any) -> Body:
-    return Body(
-        **{"name": name, "mass": 4.0, "inertia": (1.0, 2.0, 3.0), "position": (1.0, 2.0, 3.0), **parts}
-    )
+    return Body(**{"name": name, "mass": 4, "inertia": (1, 2, 3), "position": (1, 2, 3), **parts})
 
 
 def scene(*bodies: Body, **parts: Any) -> Scene:

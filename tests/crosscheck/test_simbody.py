@@ -7,7 +7,7 @@ import pytest
 
 from crosscheck.engine import Owner, Setting, engine
 from crosscheck.judge.constraints import closure, joint_coordinates
-from mbref.motions.trajectory import Outcome, Trajectory
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Driver, Scene, Sine
 from mbref.scenes import SCENES
 from tests.crosscheck.measured import MARGIN, ROUNDING, completed_error
@@ -30,9 +30,7 @@ PAPER = {  # scene: duration (s), measured error (m, rad)
 FAMILIES = ("merson", "feldberg", "cpodes")
 
 
-def simulate(
-    scene: Scene, duration: float, accuracy: float, family: str = "merson", samples: int = 6
-) -> Trajectory:
+def simulate(scene, duration, accuracy, family="merson", samples=6):
     setting = Setting(family, {"accuracy": accuracy})
     return engine("simbody").run(scene, np.linspace(0, duration, samples), setting)
 

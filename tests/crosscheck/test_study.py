@@ -144,9 +144,7 @@ def test_cluster_of_two_workers_gives_the_records_of_a_serial_study(one_after_th
 def untimed(records: list[dict]) -> list[dict]:
     """The records without the seconds that runs took, when they did, and the state of the checkout then."""
     kept = ("steps", "rejected", "rhs", "factorisations", "newton")
-    return [
-        {**r, "date": "", "commit": "", "cost": {name: r["cost"][name] for name in kept}} for r in records
-    ]
+    return [{**r, "date": "", "commit": "", "cost": {n: r["cost"][n] for n in kept}} for r in records]
 
 
 @pytest.mark.parametrize(

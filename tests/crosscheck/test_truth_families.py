@@ -128,9 +128,7 @@ STRANGERS = {
         body=(pendulum().body[0], pendulum().body[0].model_copy(update={"name": "other"})),
         joint=(pendulum().joint[0], Revolute(name="p", bodies=("ground", "other"), anchor=(0, 0, 0), axis=Z)),
     ),
-    "spherical pendulum": pendulum(
-        joint=(Spherical(name="ball", bodies=("ground", "bar"), anchor=(0, 0, 0)),)
-    ),
+    "spherical pendulum": pendulum(joint=(Spherical(name="b", bodies=("ground", "bar"), anchor=(0, 0, 0)),)),
     "no mass, no driver": Scene(
         name="s",
         body=(Body(name="bar", position=(1, 0, 0)),),

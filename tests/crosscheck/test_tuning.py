@@ -62,9 +62,7 @@ class Modelled:
 
 def found(engine: Modelled, level: float, *steps: float, ours: tuple[str, ...] = ()) -> dict[str, float]:
     done = tuned(engine.cases(*steps), level, engine, ours)
-    return {
-        r["family"]: case.setting.options["step"] for case, r in zip(done.cases, done.reached, strict=True)
-    }
+    return {r["family"]: c.setting.options["step"] for c, r in zip(done.cases, done.reached, strict=True)}
 
 
 @pytest.mark.parametrize("level", [1e-2, 3e-4, 1e-6])

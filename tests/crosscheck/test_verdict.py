@@ -27,9 +27,7 @@ REDUNDANT, SOUND = SCENES["planar_slider_crank"](), SCENES["spatial_slider_crank
 TRUTH = {"kind": "reference", "bound": 3e-14, "reason": "", "until": 1.0, "seconds": 2.4, "both": True}
 
 
-def record(
-    engine: str, family: str, error: float | None, seconds: float = 0.1, **more: Any
-) -> dict[str, Any]:
+def record(engine: str, family: str, error: float | None, seconds=0.1, **more: Any) -> dict[str, Any]:
     found = {"scene": REDUNDANT.name, "engine": engine, "family": family, "version": "1", "versions": {}}
     found |= {"outcome": "COMPLETED", "message": "", "t_end": 1.0, "times": [], "time_limit": 60.0}
     found |= {"settings": {"seconds": seconds}, "cost": {"seconds": seconds}, "machine": {"cpu": "a"}}

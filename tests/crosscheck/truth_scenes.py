@@ -20,9 +20,7 @@ def pendulum(**changes):
 def block(**changes):
     """A body on an inclined line."""
     body = Body(name="block", mass=2.0, inertia=(0.1, 0.1, 0.1), position=(1.0, 2.0, 3.0))
-    guide = Translational(
-        name="line", bodies=("ground", "block"), anchor=(1.0, 2.0, 3.0), axis=(3.0, 4.0, 0.0)
-    )
+    guide = Translational(name="line", bodies=("ground", "block"), anchor=(1, 2, 3), axis=(3, 4, 0))
     return Scene(**({"name": "block", "body": (body,), "joint": (guide,)} | changes))
 
 

@@ -22,9 +22,7 @@ def motion(maker: Callable[[], Scene]) -> Callable[[], Scene]:
     return maker
 
 
-def made(
-    name: str, bodies: list[Entry], joints: list[Entry], duration: float = 0.3, **fields: object
-) -> Scene:
+def made(name: str, bodies: list[Entry], joints: list[Entry], duration=0.3, **fields: object) -> Scene:
     """Return a scene with gravity in no special direction."""
     fields = {"gravity": GRAVITY, **fields}
     return Scene.model_validate(

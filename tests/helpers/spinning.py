@@ -48,9 +48,7 @@ def spinning_mechanism(seed: int) -> Scene:
     )
 
 
-def _added(
-    rng: np.random.Generator, name: str, parent: Body | None, spin: float | None = None
-) -> tuple[Body, Joint]:
+def _added(rng, name, parent, spin=None):
     """Return a body at a joint to the ground or to a parent, with velocities that the joint allows."""
     axis = rng.normal(size=3)
     axis /= np.linalg.norm(axis)

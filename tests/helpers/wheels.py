@@ -7,9 +7,7 @@ PACKAGE, ENGINE = "falling-engine", "falling_engine:ENGINE"
 SOURCE = (Path(__file__).parent / "falling_engine.py").read_text()
 
 
-def write_wheel(
-    folder: Path, version: str, factor: float = 1.0, step: float = 0.1, fall: str = "fall"
-) -> None:
+def write_wheel(folder, version, factor=1.0, step=0.1, fall="fall"):
     """Write the wheel of a version with these constants and this name of its function."""
     named, info = f"falling_engine-{version}", f"falling_engine-{version}.dist-info"
     text = SOURCE.replace("FACTOR, STEP = 1.0, 0.1", f"FACTOR, STEP = {factor}, {step}")

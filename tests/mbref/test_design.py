@@ -201,9 +201,7 @@ def tilted_at_rest(scene, tilt):
         "axis": (0.0, tilt, 1.0),
     }
     at_rest = [body.model_copy(update={"velocity": None, "angular_velocity": None}) for body in scene.body]
-    return scene.with_(
-        body=at_rest, joint=[revolute if joint.name == "B" else joint for joint in scene.joint]
-    )
+    return scene.with_(body=at_rest, joint=[revolute if j.name == "B" else j for j in scene.joint])
 
 
 def test_redundancy_that_a_rounded_axis_hides_is_reported():

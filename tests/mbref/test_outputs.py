@@ -27,9 +27,7 @@ def pendulum(bodies=("ground", "rod"), axis=(0.0, 0.0, 2.0), load=()) -> Scene:
     rod = {"name": "rod", "mass": MASS, "inertia": [INERTIA] * 3, "position": [ARM, 0.0, 0.0]}
     hinge = {"name": "A", "type": "revolute", "bodies": bodies, "anchor": [0.0, 0.0, 0.0], "axis": axis}
     driver = {"joint": "A", "polynomial": [0.0, 0.5], "sine": SWING}
-    return Scene(
-        name="pendulum", gravity=(0.0, -G, 0.0), body=[rod], joint=[hinge], driver=[driver], load=load
-    )
+    return Scene(name="pendulum", gravity=(0, -G, 0), body=[rod], joint=[hinge], driver=[driver], load=load)
 
 
 def angle(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

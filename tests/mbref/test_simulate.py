@@ -52,9 +52,7 @@ def test_largest_turn_bounds_the_angle_that_a_body_turns_in_a_step(turn):
 def test_fast_spin_at_a_loose_tolerance_is_followed_over_every_turn(method):
     """100 rad, to 0.01, in one sample; steps as long as rtol 0.9 allows would lose turns and torque of the
     spring, whose stiffness of 1e-9 N m/rad does not change the spin."""
-    run = completed(
-        spinning((TorsionSpring(joint="H", stiffness=1e-9),)), method, [0.0, 10.0], Limits(rtol=0.9)
-    )
+    run = completed(spinning((TorsionSpring(joint="H", stiffness=1e-9),)), method, [0, 10], Limits(rtol=0.9))
     assert run.load_at(0).angle[-1] == pytest.approx(100.0, abs=0.01)
     assert difference(np.abs(run.orientation[-1, 0, :2]), np.abs([np.cos(50.0), np.sin(50.0)])) < 0.01
 
@@ -77,10 +75,7 @@ def test_bodies_without_masses_follow_their_drivers(method):
         name="arm",
         body=(Body(name="arm", position=(0.5, 0, 0)), Body(name="block", position=(1, 0, 0))),
         joint=(hinge, slide),
-        driver=(
-            Driver(joint="H", polynomial=(0.0, 1.0, 0.5), sine=sine),
-            Driver(joint="S", polynomial=(0, 2.0)),
-        ),
+        driver=(Driver(joint="H", polynomial=(0, 1, 0.5), sine=sine), Driver(joint="S", polynomial=(0, 2))),
     )
     t = np.linspace(0, 1, 5)
     angle, reach = t + 0.5 * t**2 + 0.5 * np.sin(3 * t), 1 + 2 * t

@@ -59,9 +59,7 @@ def number_at(scene: Scene, path: str) -> float:
 
 def bytes_of(crossing: Crossing) -> list:
     """Return all fields of a crossing, its numbers as bytes."""
-    return [
-        np.asarray(value).tobytes() if key != "sentence" else value for key, value in vars(crossing).items()
-    ]
+    return [np.asarray(v).tobytes() if key != "sentence" else v for key, v in vars(crossing).items()]
 
 
 @pytest.mark.parametrize(
@@ -103,9 +101,7 @@ def test_variants_of_a_place_or_ratio_together_equal_single_runs(scene, path):
 def test_variants_with_and_without_crossings_together_equal_single_runs():
     """Gravity of up to 400 m/s² along the guide stops some cranks before crank and rod are in line, and
     others pass this position."""
-    scenes = list(
-        variants(SCENES["planar_slider_crank_equal"](), [Variation("gravity[0]", -400.0, 400.0)], 10)
-    )
+    scenes = list(variants(SCENES["planar_slider_crank_equal"](), [Variation("gravity[0]", -400, 400)], 10))
     runs, differing = compared(scenes, np.linspace(0.0, 0.1, 5), method="taylor")
     assert not differing
     passed = [len(run.crossings) for run in runs]

@@ -33,9 +33,7 @@ class Plane:
     def body(self, name: str, centre: complex, angle: float) -> Body:
         x, y, z, w = (self.turn * Rotation.from_rotvec([0.0, 0.0, angle])).as_quat()
         inertia = (1e-4 * self.unit**2, 1e-2 * self.unit**2, 1e-2 * self.unit**2)
-        return Body(
-            name=name, mass=1.0, inertia=inertia, position=self.point(centre), orientation=(w, x, y, z)
-        )
+        return Body(name=name, mass=1, inertia=inertia, position=self.point(centre), orientation=(w, x, y, z))
 
     def hinge(self, name: str, bodies: tuple[str, str], at: complex) -> Revolute:
         return Revolute(name=name, bodies=bodies, anchor=self.point(at), axis=self.axis)

@@ -20,9 +20,7 @@ def test_pages_print_more_than_50_commands_of_both_programs():
     assert len(FOUND) > 50 and {words[0] for _, words in FOUND} >= set(PARSERS)
 
 
-@pytest.mark.parametrize(
-    ("page", "words"), FOUND, ids=[f"{page}: {' '.join(words)}" for page, words in FOUND]
-)
+@pytest.mark.parametrize(("page", "words"), FOUND, ids=[f"{page} {' '.join(words)}" for page, words in FOUND])
 def test_command_that_a_page_prints_is_accepted_by_its_parser(page, words):
     """The parsers of mbref and crosscheck accept it. Other commands name a file or module for python that
     exists, an existing test after ``-k``, or the packaged conformance tests."""

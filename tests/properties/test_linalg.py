@@ -164,9 +164,7 @@ def test_full_pivoting_finds_the_rank_and_independent_rows_at_any_condition(case
     m, n = d.shape
     rows, columns = np.zeros(m, dtype=np.int64), np.zeros(n, dtype=np.int64)
     found = full_pivot(d.copy(), m, n, rows, columns, 1e-14)
-    assert found == rank, (
-        f"full pivoting found rank {found}, made with {rank}, condition {1 / values[-1]:.1e}"
-    )
+    assert found == rank, f"found rank {found}, made with {rank}, condition {1 / values[-1]:.1e}"
     smallest = np.linalg.svd(d[np.ix_(rows[:rank], columns[:rank])], compute_uv=False)[-1]
     assert smallest > 1e-3 * values[-1], f"the block chosen has {smallest:.1e}, the matrix {values[-1]:.1e}"
 

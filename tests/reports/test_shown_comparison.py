@@ -18,9 +18,7 @@ HEADINGS = re.compile(
 @pytest.fixture(scope="module")
 def printed() -> str:
     """Return the output for the plane slider-crank of the reference report."""
-    group = next(
-        group for group in groups(REPORTS / "reference") if group.scene.name == "planar_slider_crank"
-    )
+    group = next(g for g in groups(REPORTS / "reference") if g.scene.name == "planar_slider_crank")
     return str(Comparison(judged(group), "planar_slider_crank", None))
 
 

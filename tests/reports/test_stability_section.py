@@ -17,9 +17,7 @@ from reports.sections import stability as section
 STORED = Path(__file__).parents[2] / "reports" / "stability"
 
 
-def record(
-    ladder: str, difficulty: float, error: float, outcome="COMPLETED", engine="mbref", family="taylor"
-):
+def record(ladder, difficulty, error, outcome="COMPLETED", engine="mbref", family="taylor"):
     return {
         "scene": stability.scene_name(ladder, difficulty),
         "engine": engine,

@@ -118,9 +118,7 @@ def test_a_wheel_has_two_packages_and_every_file_of_data(built):
 
 def of_folder(folder: str) -> list[str]:
     """Return the names of the files in a folder of the project, without compiled modules."""
-    paths = [
-        path for path in (ROOT / folder).rglob("*") if path.is_file() and "__pycache__" not in path.parts
-    ]
+    paths = [p for p in (ROOT / folder).rglob("*") if p.is_file() and "__pycache__" not in p.parts]
     return [path.relative_to(ROOT).as_posix() for path in paths]
 
 

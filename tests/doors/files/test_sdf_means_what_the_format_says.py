@@ -16,9 +16,7 @@ def link(name: str, pose: str = "0 0 0 0 0 0", inertia: str = INERTIA) -> str:
     return f"<link name='{name}'><pose>{pose}</pose>{inertia}</link>"
 
 
-def joint(
-    name: str, kind: str, parent: str, child: str, axis: str = "0 0 1", more: str = "", inside: str = ""
-):
+def joint(name, kind, parent, child, axis="0 0 1", more="", inside=""):
     axis = f"<axis><xyz>{axis}</xyz>{inside}</axis>"
     ends = f"<parent>{parent}</parent><child>{child}</child>"
     return f"<joint name='{name}' type='{kind}'>{ends}{more}{axis}</joint>"

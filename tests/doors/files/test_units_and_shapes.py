@@ -141,9 +141,7 @@ def solid(shape):
         nodes, volumes = grid((0, shape["radius"]), (-1, 1), (0, 2 * math.pi), points=24)
         r, cosine, turn = nodes.T
         sine = np.sqrt(1 - cosine**2)
-        return np.stack(
-            [r * sine * np.cos(turn), r * sine * np.sin(turn), r * cosine], axis=1
-        ), volumes * r**2
+        return np.stack([r * sine * np.cos(turn), r * sine * np.sin(turn), r * cosine], 1), volumes * r**2
     inner, half = shape.get("inner_radius", 0.0), shape["length"] / 2
     nodes, volumes = grid((inner, shape["radius"]), (0, 2 * math.pi), (-half, half), points=24)
     r, turn, z = nodes.T

@@ -296,9 +296,7 @@ def upper_and_lower() -> list[tuple[str, str]]:
     ],
     ids=["joints", "quantities", "bodies"],
 )
-def test_explanation_of_exchanged_columns_names_both(
-    scene: str, pairs: list[tuple[str, str]], says: str
-) -> None:
+def test_explanation_of_exchanged_columns_names_both(scene, pairs, says):
     """Columns of the exact motion are exchanged between joints, quantities or bodies. Exchanged back, less
     than 1e-9 of the difference remains, the judge's own error."""
     (found,) = crosscheck.judge_motion(SCENES[scene](), exchanged_columns(scene, *pairs)).explanations

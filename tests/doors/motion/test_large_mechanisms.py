@@ -39,9 +39,7 @@ def test_largest_distance_is_the_largest_of_all_pairs(shape):
     points = SHAPES[shape]
     shuffled = np.random.default_rng(5).permutation(points)
     exact = np.sqrt(((points[:, None] - points) ** 2).sum(axis=2).max())
-    assert largest_distances(np.stack([points, shuffled])) == pytest.approx(
-        [exact, exact], rel=4e-16, abs=0.0
-    )
+    assert largest_distances(np.stack([points, shuffled])) == pytest.approx([exact, exact], rel=4e-16, abs=0)
 
 
 @functools.cache

@@ -22,11 +22,7 @@ def diagnosis_of(scene: Scene) -> tuple:
 
 def ball_linkage(ends: tuple[str, str] = ("spherical", "spherical")) -> Scene:
     """A spatial four-bar: two cranks on hinges, and a coupler between two joints of given types."""
-    bodies = [
-        rod("crank", (0.0, 0.25, 0.0)),
-        rod("coupler", (0.5, 0.5, 0.1)),
-        rod("rocker", (1.0, 0.25, 0.1)),
-    ]
+    bodies = [rod("crank", (0, 0.25, 0.0)), rod("coupler", (0.5, 0.5, 0.1)), rod("rocker", (1.0, 0.25, 0.1))]
     places = ((0.0, 0.5, 0.0), (1.0, 0.5, 0.2))
     joints = [
         hinge("A", ("ground", "crank")),

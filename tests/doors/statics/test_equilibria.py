@@ -198,11 +198,7 @@ def test_rod_on_a_stiff_slide_along_a_pendulum_is_found_hanging():
     stiffness = 1e9
     along, aside = (np.array([np.sin(a), -np.cos(a), 0.0]) for a in (1.0, 0.5))
     at = 0.8 * along
-    bodies = [
-        rod("pendulum", 0.5 * along),
-        rod("block", at, 0.5, 0.01),
-        rod("hanging", at + 0.5 * aside, 1.0),
-    ]
+    bodies = [rod("pendulum", 0.5 * along), rod("block", at, 0.5, 0.01), rod("hanging", at + aside / 2, 1.0)]
     joints = [
         hinge("A", ("ground", "pendulum")),
         parts.slide("S", "pendulum", "block", tuple(at), tuple(along)),
