@@ -53,8 +53,8 @@ def test_gausss_principle_keeps_redundant_joints_of_random_mechanisms_closed(see
 
 @pytest.mark.parametrize(("seed", "change"), [(101, "rotated"), (211, ""), (319, "rotated")])
 def test_mbref_moves_random_mechanisms_with_a_driver_as_gausss_principle(seed, change):
-    """Error of the length, at a tolerance of 1e-9. The seeds' drivers move slides; before, such runs failed
-    by a wrong Taylor series and unit of length."""
+    """Error of the length, at a tolerance of 1e-9. The seeds' drivers move slides, also in a frame that is
+    turned."""
     scene = random_scenes.mechanism(seed)
     scene = RELATIONS[change].change(scene, None) if change else scene
     times = np.linspace(0.0, scene.duration, 3)
