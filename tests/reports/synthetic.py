@@ -109,7 +109,9 @@ def truths() -> tuple[dict[str, Any], ...]:
 def motion() -> dict[str, Any]:
     """The true motion of the first scene at the instants shown, moved, as the wrong run's."""
     shown = truths()[0]["motion"]
-    bodies = {n: {**b, "position": [x + 0.1 for x in b["position"]]} for n, b in shown["bodies"].items()}
+    bodies = {
+        n: {**b, "position": (np.array(b["position"]) + 0.1).tolist()} for n, b in shown["bodies"].items()
+    }
     return {**shown, "scene": scene().name, "engine": "mujoco", "family": "defaults", "bodies": bodies}
 
 
