@@ -395,7 +395,9 @@ def test_command_list_prints_every_name_within_eighty_columns(capsys):
     assert all(f"{name} " in out for name in ("mpi-gs-literal", "baumgarte", "dop853"))
 
 
-@pytest.mark.parametrize(("done", "says"), [(1 / 180, "about 3580 s left"), (1 / 182, "more than an hour")])
+@pytest.mark.parametrize(
+    ("done", "says"), [(1 / 180, "about 3580 s left"), (1 / 182, "more than an hour left")]
+)
 def test_slow_progress_prints_seconds_up_to_an_hour(done, says, capsys):
     """A part of the run took 20 s: 179 or 181 parts are left."""
     times = iter([0.0, 20.0])
