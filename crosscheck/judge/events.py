@@ -13,7 +13,7 @@ from crosscheck.judge.energy import energy_balance
 from crosscheck.judge.impacts import impact
 from crosscheck.judge.joint_reactions import resultants
 from crosscheck.judge.loads import world_inertia
-from crosscheck.judge.pieces import State, at_start, has_pieces, later, without_rounding
+from crosscheck.judge.pieces import State, at_start, has_pieces, later
 from mbref import rotations
 from mbref.motions.event import Event
 from mbref.motions.trajectory import PER_BODY, Trajectory
@@ -51,10 +51,16 @@ def _pieces(scene: Scene, trajectory: Trajectory) -> Iterator[tuple[float, Scene
 
 
 def _after(scene: Scene, piece: Scene, event: Event) -> Scene:
-    """Return the piece that begins at an event of a run, with the run's velocities after it."""
-    before = State(event.position, event.orientation, event.velocity, event.angular_velocity)
-    after = before._replace(velocity=event.velocity_after, angular_velocity=event.angular_velocity_after)
-    return later(scene, piece, event.time, without_rounding(scene, after, before), _moved(scene, event))
+    """Return the piece that begins at an event of a run, with the velocities that the judge finds from the
+    run's velocities before it: they obey the constraints exactly."""
+    before, moved = _before(event), _moved(scene, event)
+    after = later(scene, piece, event.time, before, moved)
+    return later(scene, piece, event.time, impact(after, before).state, moved)
+
+
+def _before(event: Event) -> State:
+    """Return the state of a run before an event."""
+    return State(event.position, event.orientation, event.velocity, event.angular_velocity)
 
 
 def _moved(scene: Scene, event: Event) -> dict[str, np.ndarray]:
@@ -116,8 +122,7 @@ def impact_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | None)
     velocities times the scene's length, relative to the largest velocity before; None without impacts."""
     off, scale, length = [0.0], [0.0], scene_length(scene)
     for event, after in _impacts(scene, trajectory):
-        before = State(event.position, event.orientation, event.velocity, event.angular_velocity)
-        found = impact(after, before).state
+        found = impact(after, _before(event)).state
         off.append(float(np.abs(found.velocity - event.velocity_after).max()))
         off.append(length * float(np.abs(found.angular_velocity - event.angular_velocity_after).max()))
         scale += [float(np.abs(event.velocity).max()), length * float(np.abs(event.angular_velocity).max())]
@@ -129,10 +134,9 @@ def impact_energy_error(scene: Scene, trajectory: Trajectory, exact: Trajectory 
     velocities, relative to the energy before; None with drivers, which do work."""
     off = []
     for event, after in _impacts(scene, trajectory):
-        before = State(event.position, event.orientation, event.velocity, event.angular_velocity)
         if not scene.driver and event.energy_before:
             lost = event.energy_before - event.energy_after
-            off.append(abs(lost - impact(after, before).lost) / event.energy_before)
+            off.append(abs(lost - impact(after, _before(event)).lost) / event.energy_before)
     return max(off, default=None)
 
 

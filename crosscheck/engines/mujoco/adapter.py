@@ -26,12 +26,13 @@ from crosscheck.engines.mujoco.families import (
 )
 from crosscheck.engines.mujoco.model import SUPPORTS
 from crosscheck.engines.mujoco.simulation import Simulation
-from crosscheck.engines.mujoco.switched import SwitchedRun, refusal, served
+from crosscheck.engines.mujoco.switched import SERVED, EqualityRun
 from crosscheck.engines.mujoco.ways import ALTERNATIVES
 from crosscheck.engines.shared.driver_motion import fastest_rate
 from crosscheck.engines.shared.initial_velocities import lacks_mass
 from crosscheck.engines.shared.planar_scene import planar_scene
 from crosscheck.engines.shared.sampling import run_through
+from crosscheck.engines.shared.switched import refusal, served
 from crosscheck.judge.pieces import at_start
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene, intermittent
@@ -64,13 +65,14 @@ class MuJoCo(linearised.Linearised, Engine):
     def refuses(self, scene: Scene) -> Cannot | None:
         """Refuse scenes without masses whose motion the drivers do not determine completely, and joints with
         intervals that no equality of MuJoCo can switch."""
-        return lacks_mass(at_start(scene)) or refusal(scene)
+        return lacks_mass(at_start(scene)) or refusal(scene, "MuJoCo")
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
         """Return fixed steps chosen by the angle that a body turns in one step, and adaptive steps by
         relative tolerance."""
         first = at_start(scene)
-        return served(scene, sweep(first, fastest_rate(first, lambda step: self._coarse(scene, step))))
+        found = sweep(first, fastest_rate(first, lambda step: self._coarse(scene, step)))
+        return served(scene, found, SERVED)
 
     def serves(self, scene: Scene, family: str) -> bool:
         """Return whether a family can run a scene; `tuned` and `chosen` run every scene."""
@@ -105,7 +107,9 @@ class MuJoCo(linearised.Linearised, Engine):
             "settings": dict(setting.options),
         }
         if any(intermittent(scene)):
-            return SwitchedRun(scene, setting).trajectory(times, start, labels)
+            switched = EqualityRun(scene, setting)
+            with switched.run.installed(), np.errstate(all="ignore"):
+                return switched.trajectory(times, switched.run.counts, start, labels)
         run = Simulation(scene, setting)
         with run.installed(), np.errstate(all="ignore"):
             if setting.family in COMPILED:

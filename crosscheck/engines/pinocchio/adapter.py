@@ -28,12 +28,15 @@ from crosscheck.engines.pinocchio.families import (
 )
 from crosscheck.engines.pinocchio.model import SUPPORTS
 from crosscheck.engines.pinocchio.simulation import Simulation
+from crosscheck.engines.pinocchio.switched import SERVED, ConstraintRun
 from crosscheck.engines.shared.driver_motion import fastest_rate
 from crosscheck.engines.shared.initial_velocities import lacks_mass
 from crosscheck.engines.shared.planar_scene import planar_scene
 from crosscheck.engines.shared.sampling import run_through
+from crosscheck.engines.shared.switched import refusal, served
+from crosscheck.judge.pieces import at_start
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import Scene
+from mbref.scene import Scene, intermittent
 
 SCOUT_RTOL = 1e-5
 SCOUT_SAMPLES = 41  # number of samples of the coarse run that measures the scene's fastest rate
@@ -44,7 +47,7 @@ class Pinocchio(Engine):
 
     name = "pinocchio"
     package = "pin"
-    supports = SUPPORTS
+    supports = replace(SUPPORTS, intervals=True)
     families, options, integrated_here = FAMILIES, OPTIONS, tuple(FAMILIES)
     alternatives = ALTERNATIVES
     defaults_of = ("pinocchio.ProximalSettings()",)
@@ -60,12 +63,13 @@ class Pinocchio(Engine):
         if scene.coupling:
             reason = f"coupling {scene.coupling[0].name!r}: constraintDynamics couples no joint coordinates"
             return Cannot(Owner.ENGINE, reason)
-        return lacks_mass(scene)
+        return lacks_mass(at_start(scene)) or refusal(scene, "Pinocchio")
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
         """Return fixed steps by the angle that a body turns in one step, and adaptive steps by tolerance."""
-        rate = fastest_rate(scene, lambda step: self._coarse(scene, step))
-        return sweep(scene, rate)
+        first = at_start(scene)
+        rate = fastest_rate(first, lambda step: self._coarse(scene, step))
+        return served(scene, sweep(first, rate), SERVED)
 
     def serves(self, scene: Scene, family: str) -> bool:
         """Return whether a family can run a scene; `tuned` and `chosen` run every scene."""
@@ -92,13 +96,17 @@ class Pinocchio(Engine):
             return replace(self.run(planar, times, setting), reactions=None)
         start = time.process_time()
         python = Setting("dop853", setting.options) if setting.family in COMPILED else setting
-        run = Simulation(scene, python)
         labels = {
             "engine": self.name,
             "version": self.version(),
             "method": setting.family,
             "settings": dict(setting.options),
         }
+        if any(intermittent(scene)):
+            switched = ConstraintRun(scene, setting)
+            with np.errstate(all="ignore"):
+                return switched.trajectory(times, switched.run.counts, start, labels)
+        run = Simulation(scene, python)
         with np.errstate(all="ignore"):
             if setting.family in COMPILED:
                 return run.without_python(times, setting, start, labels)

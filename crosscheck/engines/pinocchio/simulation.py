@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -80,14 +80,10 @@ class Simulation:
         self.is_looped = len(closures) > 0 and LCABA in (family, options.get("solver"))
         if self.is_looped:
             closures = [ground_second(pin, self.model, closure) for closure in closures]
-        self.closures = pin.StdVec_RigidConstraintModel()
-        self.closures.extend(closures)
-        self.closure_data = pin.StdVec_RigidConstraintData()
-        self.closure_data.extend([c.createData() for c in self.closures])
         self.data = self.model.createData()
         if not self.model.check(self.data):
             raise AssertionError("Pinocchio's joints are not in depth-first order")
-        pin.initConstraintDynamics(self.model, self.data, self.closures, self.closure_data)
+        self.hold(closures)
         self.hint = HINTS.get(family, "")
         given = ((), ()) if family == "defaults" else (CONVERGED, FORCES)
         self.solver, self.sampler = (pin.ProximalSettings(*options) for options in given)
@@ -111,6 +107,15 @@ class Simulation:
             self.step = adaptive.advance
         else:
             raise unknown_family("pinocchio", family)
+
+    def hold(self, closures: Sequence[Any]) -> None:
+        """Let constraint models, and no other ones, hold from now on."""
+        pin = self.pin
+        self.closures = pin.StdVec_RigidConstraintModel()
+        self.closures.extend(closures)
+        self.closure_data = pin.StdVec_RigidConstraintData()
+        self.closure_data.extend([c.createData() for c in self.closures])
+        pin.initConstraintDynamics(self.model, self.data, self.closures, self.closure_data)
 
     def _max_step(self) -> float:
         if not self.driven:

@@ -26,6 +26,10 @@ BALANCES = (
     "violation_position",
     "violation_velocity",
 )
+SETTINGS = {
+    "mujoco": Setting("tuned", {"step": 1e-3, "beta": 50.0, "hard": 1e-7}),
+    "pinocchio": Setting("tuned", {"rtol": 1e-10, "min_step": 1e-5}),
+}
 CLOSE = 1e-10  # of mbref's balances and violations, whose rounding grows with the singular values of rows
 
 
@@ -100,14 +104,18 @@ def test_wrong_impacts_are_measured():
         assert measure(scene, wrong)[name] > 1e-3
 
 
+@pytest.mark.parametrize("name", SETTINGS)
 @pytest.mark.parametrize("make", [carts, rotors, caught])
-def test_mujoco_switches_equalities_and_other_engines_refuse_by_name(make):
+def test_engines_switch_constraints_or_refuse_them_by_name(make, name):
+    """MuJoCo switches equalities, Pinocchio constraint models, which couple no coordinates."""
     scene, times = make(), np.linspace(0.0, make().duration, 5)
-    run = engine("mujoco").run(scene, times, Setting("tuned", {"step": 1e-3, "beta": 50.0, "hard": 1e-7}))
+    if name == "pinocchio" and scene.coupling:
+        assert "couples no joint coordinates" in str(engine(name).cannot(scene))
+        return
+    run = engine(name).run(scene, times, SETTINGS[name])
     exact = motion_by(natural_motion, scene, times, EXTENDED)
     assert np.abs(run.position - doubles(exact.position)).max() <= 1e-8
-    assert measure(scene, run)["impact_error"] <= ROUNDING
-    for name in ("pinocchio", "exudyn"):
-        assert "active has intervals" in str(engine(name).cannot(scene))
+    assert measure(scene, run)["impact_error"] <= CLOSE
+    assert "active has intervals" in str(engine("exudyn").cannot(scene))
     hinged = carts(type="revolute", anchor=[0, 0, 0], axis=[0, 0, 1])
-    assert "joint 'L' of type 'revolute' has intervals" in str(engine("mujoco").cannot(hinged))
+    assert "joint 'L' of type 'revolute' has intervals" in str(engine(name).cannot(hinged))
