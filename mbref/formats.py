@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -17,6 +17,10 @@ from mbref.scene import Scene, refuse_intervals
 
 GROUP = "mbref.formats"
 REMEDIES = {".xacro": "; write a URDF with `xacro FILE > robot.urdf`"}  # by endings that no format reads
+
+
+def quiet(_: str) -> None:
+    """Discard a sentence on long work."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,8 @@ class ImportOptions:
         Pairs of frames that close a loop, such as ``frame_a=frame_b:revolute:y``.
     hold : sequence of str
         Bodies that hang on the world and lose their joints there, such as the trunk of a walking robot.
+    say : callable
+        Function that receives sentences on long work, such as closing loops; by default they are discarded.
     """
 
     without: Collection[str] = ()
@@ -42,6 +48,7 @@ class ImportOptions:
     pose: Mapping[str, float] = field(default_factory=dict)
     close: Sequence[str] = ()
     hold: Sequence[str] = ()
+    say: Callable[[str], None] = field(default=quiet, compare=False, repr=False)
 
     def words(self) -> list[str]:
         """Return the words of a command line that give these options."""

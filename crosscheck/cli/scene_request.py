@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from crosscheck.judge.constraints import initial_twists
@@ -47,10 +48,10 @@ def read_scenes(
     another program is read with the options ``reading``; ``notice`` reports the parts of the file that the
     scene does not contain.
     """
-    scenes, faults = [], []
+    scenes, faults, asked = [], [], replace(reading or ImportOptions(), say=notice)
     for name in names:
         try:
-            scenes.append(_started(name, reading or ImportOptions(), notice))
+            scenes.append(_started(name, asked, notice))
         except SceneError as error:
             several = f"{name}: " if len(names) > 1 else ""
             faults += [several + fault for fault in error.faults]

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +53,8 @@ def _import(options: argparse.Namespace) -> int:
     out = free(options.out or Path(options.file).with_suffix(".toml"), options.force)
     if out.suffix != ".toml":
         raise InputError(f"--out: must end in .toml, got {str(out)!r}")
-    found = formats.read(options.file, formats.import_options(options))
+    asked = replace(formats.import_options(options), say=lambda text: print(text, file=sys.stderr))
+    found = formats.read(options.file, asked)
     found.scene.save(out)
     status = _report(out, found.left_out)
     for sentence in found.notes:

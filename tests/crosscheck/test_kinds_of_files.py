@@ -129,6 +129,16 @@ def test_loop_is_closed_between_joints_as_between_their_child_links():
     assert by_joints.joint[-1].type == "spherical" and np.allclose(*ends, rtol=0, atol=1e-15)
 
 
+def test_each_further_attempt_to_close_a_loop_is_announced():
+    """The straight chain without gravity closes from none of four poses."""
+    said: list[str] = []
+    with pytest.raises(SceneError):
+        source(KINDS / "straight_without_gravity.xml", ImportOptions(say=said.append))
+    assert [text.partition(":")[0] for text in said] == [
+        f"closing the loops, attempt {k} of 4" for k in (2, 3, 4)
+    ]
+
+
 def joints_of(name):
     return ET.parse(KINDS / name).getroot().findall("joint")
 

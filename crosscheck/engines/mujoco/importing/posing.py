@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from crosscheck.engines.mujoco.importing import keyframes
 from crosscheck.engines.mujoco.importing.chains import kind_of
 from crosscheck.engines.mujoco.importing.closures import Closure
+from mbref.formats import quiet
 from mbref.scene import SceneError
 
 CLOSED = 1e-12  # fraction of the model's extent, or rad; smaller gaps count as closed
@@ -82,16 +83,23 @@ class Poses:
         found = {c.name: c.opening(self.data) for c in self.closures}
         return found | {row.name: abs(self._residual(row)) for row in self.joint_rows}
 
-    def close(self) -> None:
+    def close(self, say: Callable[[str], None] = quiet) -> None:
         """Move the coordinates until all loops are closed, by the least change weighted with the masses.
 
         Coordinates of ``--pose`` are unchanged if the loops allow it. If no small motion closes the loops, as
         for a straight chain, the pose is first moved in the direction in which the weight accelerates it.
-        Raises SceneError with the least gap of all poses that were tried.
+        ``say`` receives a sentence before each further attempt, which may take seconds. Raises SceneError
+        with the least gap of all poses that were tried.
         """
         start = self.data.qpos.copy()
         least: list[tuple[float, str]] = []
-        for held, falls in ((self.held, False), (self.held, True), ([], False), ([], True)):
+        held_ones: tuple[list[int], ...] = (self.held, [])
+        attempts = [(held, falls) for held in held_ones for falls in (False, True)]
+        for number, (held, falls) in enumerate(attempts, start=1):
+            if least:
+                gap, name = min(least)
+                more = f"the least gap of {name!r} is {gap:.3g} m or rad"
+                say(f"closing the loops, attempt {number} of {len(attempts)}: {more}")
             self.data.qpos[:] = start
             if falls:
                 self.mujoco.mj_integratePos(self.model, self.data.qpos, self._fall(), 1.0)

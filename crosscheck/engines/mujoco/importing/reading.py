@@ -202,7 +202,7 @@ class _Reader:
     def _close(self) -> None:
         """Close the loops, and report how large their gaps were."""
         wide = {n: gap for n, gap in self.poses.gaps().items() if gap > OPEN * self.poses.extent}
-        self.poses.close()
+        self.poses.close(self.options.say)
         for name, gap in wide.items():
             self.notes.append(
                 f"closure {name!r} was open by {gap:.3g} m or rad; the joints moved to close it"
