@@ -40,6 +40,8 @@ class Constraint(NamedTuple):
 def unknown(machine: Machine) -> str:
     """Return why the rows of a machine are unknown; empty if they are known."""
     single = {joint.name for joint in machine.joints if joint.type in SCALAR}
+    if not single:
+        return "no hinge or slide"
     for loop in machine.loops or ():
         if loop.type not in LOCKED or loop.anchors is None or not all(loop.anchors):
             return f"loop {loop.name} of type {loop.type}"
