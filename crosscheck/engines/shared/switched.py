@@ -1,6 +1,6 @@
 """Runs of engines through the events of joints and couplings with intervals, shared by adapters.
 
-An adapter simulates the scene with the joints and couplings that always hold. It switches the other ones as
+An adapter simulates the scene with the joints and couplings that always hold. It switches all others as
 constraints of the engine, and changes the joint velocities where some begin to hold.
 """
 
