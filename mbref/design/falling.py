@@ -15,9 +15,9 @@ from mbref.design.balance import STRIDE, Newton, balanced
 from mbref.design.joint_angles import slots
 from mbref.design.linearisation import OffConstraints, Tangent
 from mbref.equations.model import Model
-from mbref.scene import SlideSpring, Spring, TorsionSpring
+from mbref.scene import Spring, TorsionSpring
 
-SPRINGS = (Spring, TorsionSpring, SlideSpring)
+SPRINGS = (Spring, TorsionSpring)  # not those of slides, which would fall without end
 MOST_FALLS = 100  # largest number of steps of a fall
 MOST_HALVINGS = 12  # largest number of times that a step is halved
 ARRIVED = 1e-3  # step, lengths or rad, from which Newton's method goes on
@@ -52,7 +52,7 @@ def _starts(found: Sequence[Newton], given: Sequence[Tangent | None], freedoms: 
 
 
 def _hanging(first: Tangent, freedoms: int) -> Tangent | None:
-    """Return the pose to which the mechanism falls without springs; None if it has none, or no such pose."""
+    """Return the pose to which the mechanism falls without SPRINGS; None if it has none, or no such pose."""
     scene = first.model.scene
     loads = tuple(load for load in scene.load if not isinstance(load, SPRINGS))
     if len(loads) == len(scene.load):

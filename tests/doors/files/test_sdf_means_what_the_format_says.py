@@ -135,15 +135,6 @@ def test_a_number_that_no_scene_has_is_refused_with_its_part(files):
     assert "joint 'j': dynamics" in said and "damping" in said and "-1" in said
 
 
-def test_moments_of_inertia_of_a_flat_plate_are_read(files):
-    """One is the sum of the others, 0.3 = 0.1 + 0.2 kg m², except for rounding."""
-    scene, _ = files.scene(
-        sdf(link("plate", inertia=inertia(0.1, 0.2, 0.3)), joint("j", "revolute", "world", "plate")),
-        "flat.sdf",
-    )
-    assert scene.body[0].inertia == (0.1, 0.2, 0.3)
-
-
 def hanging(limit: str, kind: str = "revolute") -> str:
     """A body that gravity turns about y towards larger angles, or that falls along -z."""
     axis, at = ("0 1 0", "0.3 0 0 0 0 0") if kind == "revolute" else ("0 0 1", "0 0 0 0 0 0")
