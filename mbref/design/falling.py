@@ -17,7 +17,7 @@ from mbref.design.linearisation import OffConstraints, Tangent
 from mbref.equations.model import Model
 from mbref.scene import Spring, TorsionSpring
 
-SPRINGS = (Spring, TorsionSpring)  # not those of slides, which would fall without end
+SPRINGS = (Spring, TorsionSpring)  # without its own spring a slide falls without end
 MOST_FALLS = 100  # largest number of steps of a fall
 MOST_HALVINGS = 12  # largest number of times that a step is halved
 ARRIVED = 1e-3  # step, lengths or rad, from which Newton's method goes on
