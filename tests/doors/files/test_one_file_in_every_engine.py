@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from crosscheck.cli.commands import main
+from crosscheck.cli.files import document
 from crosscheck.engines.loaders.loader import DOUBLE, MJCF, SDF, URDF, built
 from crosscheck.engines.loaders.machine import Machine, vector
 from crosscheck.engines.loaders.mujoco import Mujoco
@@ -226,9 +227,9 @@ def test_verdict_names_what_is_dropped_and_whether_the_reader_says_so(tmp_path: 
     text = case.text.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><dynamics friction="0.2"/>', 1)
     path = written(tmp_path, text, "robot.urdf")
     assert main(["files", str(path), "--engine", f"{READERS}:Uncoupled", "--json"]) == 1
-    document = json.loads(capsys.readouterr().out)
-    (found,) = document["readers"]
-    (pictures,) = [block for block in blocks(document) if isinstance(block, Moving)]
+    printed = json.loads(capsys.readouterr().out)
+    (found,) = printed["readers"]
+    (pictures,) = [block for block in blocks(printed) if isinstance(block, Moving)]
     assert [title for title, _ in pictures.panels] == ["the file", "uncoupled"]
     assert all(f">{name}<" in pictures.panels[1][1] for name in ("shoulder", "elbow", "wrist"))
     assert found["grade"] == "another machine" and found["messages"] == [
@@ -248,6 +249,11 @@ def test_advice_was_tried_and_refusals_have_the_readers_message(tmp_path: Path, 
     assert "cannot read: ValueError: the model has no name" in printed
     assert printed.count("Tried:") == 1
     assert "Tried: give the model a name, <mujoco model=…>. Result: the file's machine in strict." in printed
+
+
+def test_joint_without_limits_has_null_in_the_json_document(tmp_path: Path):
+    found = json.loads(json.dumps(document(file_of(written(tmp_path, LOOP)), [], []), allow_nan=False))
+    assert {joint["upper"] for joint in found["machine"]["joints"]} == {None}
 
 
 def test_faulty_file_and_unknown_reader_are_refused_in_a_sentence(tmp_path: Path, capsys: Any):
