@@ -40,7 +40,7 @@ def refusal(scene: Scene, engine: str) -> Cannot | None:
 
 
 def served(scene: Scene, settings: Sequence[Setting], families: Collection[str]) -> list[Setting]:
-    """Return the settings that can run a scene: those of some families where it has intervals."""
+    """Return the settings that can run a scene: of these families only, where the scene has intervals."""
     return [each for each in settings if each.family in families or not any(intermittent(scene))]
 
 
