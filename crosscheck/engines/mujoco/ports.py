@@ -23,9 +23,11 @@ from crosscheck.engines.shared.tree_reactions import LinkMotion
 from mbref.scene import Scene
 
 SUPPORTS = replace(OF_MUJOCO, over_time=(), massless_links=False)
+MOST_DENSE = 60  # degrees of freedom, for more MuJoCo Warp has no dense Jacobian
 STOCK, BY_C = "stock", "C"
 FAMILIES = {
-    STOCK: "closures as stiff as documented (time constant two steps, impedance 0.9999), RK4; dense Jacobian",
+    STOCK: "closures as stiff as documented (time constant two steps, impedance 0.9999), RK4; dense "
+    "Jacobian where the port has one",
     "euler": "like stock, first-order integrator Euler",
     "defaults": "the library's own options; the time step alone is given",
     BY_C: "like stock, stepped by MuJoCo's library in C, in double precision",
@@ -83,7 +85,8 @@ class PortedModel:
         self.model = model = self.built.model
         model.opt.timestep = setting.options["step"]
         if setting.family != "defaults":
-            model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+            if model.nv <= MOST_DENSE or setting.family == BY_C:
+                model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
             kind = mujoco.mjtIntegrator
             model.opt.integrator = kind.mjINT_EULER if setting.family == "euler" else kind.mjINT_RK4
             if setting.options.get("solver") == "CG":
