@@ -41,7 +41,7 @@ def table(records: Sequence[Record]) -> Mapping[str, Mapping[Row, Sequence[Recor
 
 def summary(records: Sequence[Record]) -> list[tuple[str, ...]]:
     """Return a line for each family, under SUMMARY."""
-    lines = []
+    lines: list[tuple[str, ...]] = []
     for row, of in orders.table(records, ROWS, mechanisms()).items():
         done = [[record for record in each if is_completed(record)] for each in of.values()]
         done = [each for each in done if each]

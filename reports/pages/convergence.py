@@ -34,11 +34,12 @@ def parts(records: Path = FILE) -> Parts:
     }
 
 
-def _of_scenes() -> Table:
+def _of_scenes() -> Fold:
     found = every_scene.table(read_runs(every_scene.FILE))
     header = ("scene", *(row.name for row in every_scene.ROWS))
     rows = [(f"`{name}`", *map(every_scene.cell, of.values())) for name, of in found.items()]
-    return Table("Least errors, orders in parentheses, and CPU time.", header, rows)
+    table = Table("Least errors, orders in parentheses, and CPU time.", header, rows)
+    return Fold("Families on every scene", "every-scene", [table])
 
 
 def _runs(row: Row, version: str, runs: Mapping[str, Sequence[Record]]) -> Fold:
