@@ -84,12 +84,13 @@ def test_states_that_are_not_finite_have_infinite_errors(value):
     assert not any(v is not None and math.isnan(v) for v in found.values()), found
 
 
-def test_only_metrics_of_the_error_are_none_without_a_truth():
-    """Violations and the energy error follow from the run and the scene alone."""
+def test_only_metrics_of_the_error_and_of_impacts_are_none_without_a_truth():
+    """Violations and energy error follow from the run and the scene alone, which has no intervals."""
     found = measure(SCENE, EXACT)
     missing = {name for name, value in found.items() if value is None}
     errors = {f"{quantity}_error" for quantity in ("position", "rotation", "velocity", "reaction")}
-    assert missing == {"error", "error_bound", "error_until", "scd", *errors}, missing
+    impacts = {"impact_error", "impulse_error", "impact_energy_error"}
+    assert missing == {"error", "error_bound", "error_until", "scd", *errors, *impacts}, missing
 
 
 def test_metrics_do_not_depend_on_the_order_of_bodies():
