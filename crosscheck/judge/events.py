@@ -102,18 +102,20 @@ def energy_error(scene: Scene, trajectory: Trajectory) -> float | None:
 
 def impulse_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
     """Return the largest difference of a body's change of momentum at an event from the impulses of its
-    joints, relative to the largest change; None where a run does not give all impulses."""
+    joints, relative to the largest momentum; None where a run does not give all impulses."""
     off, scale = [0.0], [0.0]
     for event, after in _impacts(scene, trajectory):
         if not {joint.name for joint in after.joint} <= set(event.impulses):
             continue
         units = np.repeat([1.0, scene_length(scene)], 3)
-        change = _momentum_change(scene, event) / units
+        jump = event.velocity_after - event.velocity, event.angular_velocity_after - event.angular_velocity
+        change = _momenta(scene, event, *jump) / units
+        before = _momenta(scene, event, event.velocity, event.angular_velocity) / units
         one = {name: wrench[None] for name, wrench in event.impulses.items()}
         state: dict[str, Any] = {"position": event.position[None], "orientation": event.orientation[None]}
         pulls = resultants(after, replace(trajectory, **state, reactions=one), 0) / units
         off.append(float(np.abs(change - pulls).max()))
-        scale.append(float(np.abs(change).max()))
+        scale.append(float(max(np.abs(change).max(), np.abs(before).max())))
     return max(off) / max(scale) if max(scale) else None
 
 
@@ -150,9 +152,9 @@ def _impacts(scene: Scene, trajectory: Trajectory) -> Iterator[tuple[Event, Scen
             yield event, after
 
 
-def _momentum_change(scene: Scene, event: Event) -> np.ndarray:
-    """Return the changes (nb, 6) of momentum and of angular momentum about the centres of mass, world."""
+def _momenta(scene: Scene, event: Event, velocity: np.ndarray, spin: np.ndarray) -> np.ndarray:
+    """Return momentum, and angular momentum about the centre of mass (nb, 6), world, of velocities (nb, 3) at
+    the poses of an event."""
     mass = np.array([body.mass or 0.0 for body in scene.body])[:, None]
     inertia = world_inertia(scene, rotations.to_matrix(event.orientation[None]))[0]
-    spin = event.angular_velocity_after - event.angular_velocity
-    return np.hstack([mass * (event.velocity_after - event.velocity), np.einsum("bij,bj->bi", inertia, spin)])
+    return np.hstack([mass * velocity, np.einsum("bij,bj->bi", inertia, spin)])

@@ -281,7 +281,7 @@ METRICS: dict[str, Metric] = {
     "energy_error": Metric(_energy, "", "drift of the energy balance / largest energy"),
     "reaction_error": Metric(reaction_error, "", "error of unique reactions / largest true reaction", True),
     "impact_error": Metric(events.impact_error, "", "error of velocities after impacts / largest velocity"),
-    "impulse_error": Metric(events.impulse_error, "", "momentum balance of impacts / largest change"),
+    "impulse_error": Metric(events.impulse_error, "", "momentum balance of impacts / momentum"),
     "impact_energy_error": Metric(
         events.impact_energy_error, "", "energy balance of impacts / energy before"
     ),
