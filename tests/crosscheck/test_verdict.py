@@ -3,7 +3,7 @@
 import io
 import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from crosscheck.study.grades import Grade, Judged, grade, judged
 from crosscheck.study.words.speed import fast
 from crosscheck.study.words.truth import truth
 from crosscheck.study.words.verdict import breaks, headline, right, verdict
+from mbref.motions.trajectory import Cost
 from mbref.records import append
 from mbref.scenes import SCENES
 from reports.runs import Run
@@ -30,7 +31,7 @@ TRUTH = {"kind": "reference", "bound": 3e-14, "reason": "", "until": 1.0, "secon
 def record(engine: str, family: str, error: float | None, seconds=0.1, **more: Any) -> dict[str, Any]:
     found = {"scene": REDUNDANT.name, "engine": engine, "family": family, "version": "1", "versions": {}}
     found |= {"outcome": "COMPLETED", "message": "", "t_end": 1.0, "times": [], "time_limit": 60.0}
-    found |= {"settings": {"seconds": seconds}, "cost": {"seconds": seconds}, "machine": {"cpu": "a"}}
+    found |= {"settings": {"seconds": seconds}, "cost": asdict(Cost(seconds)), "machine": {"cpu": "a"}}
     found |= {"metrics": {"error": error, "error_bound": 3e-14}, "key": f"{engine} {family} {seconds}"}
     asked = {"engine": engine, "options": {"s": seconds}, "samples": 3, "end": 1.0}
     return {**found, "asked": asked, **more}
