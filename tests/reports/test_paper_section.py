@@ -211,7 +211,8 @@ def test_digits_of_exact_accelerations_are_all_and_of_a_run_that_failed_at_its_s
     run = {"scene": records[missing]["scene"], "engine": "mbref", "version": "1", "method": "alf"}
     run |= {"settings": {}, "bodies": ("crank", "rod", "slider"), "message": ""}
     lost = Trajectory.failed(**run, outcome=Outcome.NOT_CONVERGED)
-    other = {**records, missing: {**MADE_OF, **lost.to_record(), "scene": records[missing]["scene"]}}
+    lost_record = {**MADE_OF, **lost.to_record(), "key": "lost", "scene": records[missing]["scene"]}
+    other = {**records, missing: lost_record}
     assert np.isnan(paper_methods.digit_errors(other)["alf"][0])
 
 

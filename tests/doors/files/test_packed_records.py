@@ -1,7 +1,7 @@
 """Packed records of a report, and compressed files of records: read as the files are; damage is named."""
 
 import lzma
-import runpy
+import subprocess
 import sys
 from pathlib import Path
 
@@ -16,15 +16,14 @@ from tests.fuzz.broken_files import RECORD
 REPORTS = Path(__file__).parents[3] / "reports"
 
 
-@pytest.mark.filterwarnings("ignore:.*found in sys.modules")
-def test_a_packed_folder_renders_as_the_folder_itself_and_has_equal_records(tmp_path, monkeypatch, capsys):
+def test_a_packed_folder_renders_as_the_folder_itself_and_has_equal_records(tmp_path, capsys):
     """`python -m reports.keep` packs a folder of one record; `diff` compares the records."""
     plain, packed = tmp_path / "plain", tmp_path / "packed"
     (plain / "scenes").mkdir(parents=True)
     SCENES["four_bar"]().save(plain / "scenes" / "four_bar.toml")
     rewrite(plain / "records.jsonl", [RECORD])
-    monkeypatch.setattr(sys, "argv", ["reports.keep", str(plain), str(packed)])
-    runpy.run_module("reports.keep", run_name="__main__")
+    command = [sys.executable, "-m", "reports.keep", str(plain), str(packed)]
+    subprocess.run(command, cwd=REPORTS.parent, check=True, capture_output=True)
     assert [path.name for path in packed.iterdir()] == ["records.zip"]
     assert crosscheck(["diff", str(plain), str(packed)]) == 0
     assert "0 of 1 runs of both sets changed" in " ".join(capsys.readouterr().out.split())
