@@ -31,7 +31,7 @@ MOMENTA = ("momentum", "angular momentum")
 
 
 class Steps(NamedTuple):
-    """A fine and a coarser setting of a family or way; ``coarser`` is None if it has no other."""
+    """A fine and a coarser setting of a family or way; ``coarser`` is None if there is one setting only."""
 
     name: str
     fine: Setting

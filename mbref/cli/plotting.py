@@ -66,13 +66,14 @@ def add(commands: Any) -> None:
 
 def _values(words: Sequence[str]) -> dict[str, list[float]]:
     """Return the values of ``--vary`` by option; raises InputError for a word without numbers."""
-    try:
-        pairs = [word.split("=") for word in words]
-        return {name: [float(number) for number in numbers.split(",")] for name, numbers in pairs}
-    except ValueError:
-        raise InputError(
-            f"--vary: must be OPTION=NUMBER,…, such as alpha=1,5,25, got {words[-1]!r}"
-        ) from None
+    found = {}
+    for word in words:
+        name, _, numbers = word.partition("=")
+        try:
+            found[name] = [float(number) for number in numbers.split(",")]
+        except ValueError:
+            raise InputError(f"--vary: must be OPTION=NUMBER,…, such as alpha=1,5,25, got {word!r}") from None
+    return found
 
 
 def _motions(options: argparse.Namespace, run: Request, names: Sequence[str]) -> dict[str, Motion]:

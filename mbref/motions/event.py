@@ -85,14 +85,8 @@ class Event:
         found = {each.name: getattr(self, each.name) for each in fields(self)}
         found |= {key: found[key].tolist() for key in EVENT_STATES}
         found["impulses"] = {name: wrench.tolist() for name, wrench in self.impulses.items()}
-        return (
-            found
-            | {key: list(found[key]) for key in ("engaged", "released")}
-            | {
-                "angles": dict(self.angles),
-                "open": dict(self.open),
-            }
-        )
+        names = {key: list(found[key]) for key in ("engaged", "released")}
+        return {**found, **names, "angles": dict(self.angles), "open": dict(self.open)}
 
     @staticmethod
     def from_record(record: Mapping[str, Any]) -> Event:

@@ -58,7 +58,7 @@ def test_cell_shows_the_grade_and_the_error_of_a_run(record, text) -> None:
 
 
 def test_cell_has_the_run_of_least_error_and_the_run_of_the_defaults() -> None:
-    """Of the first mechanism; "Bennett" has no runs."""
+    """The runs are of the first mechanism; the mechanism "Bennett" has no runs."""
     found = [
         measured(1e-3, "defaults"),
         measured(1e-9),

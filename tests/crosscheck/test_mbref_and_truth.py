@@ -52,8 +52,8 @@ def run_of(scene, end, method, rtol):
 
 @pytest.mark.parametrize(("name", "end", "method", "rtol", "measured"), [*RUNS, *ACROSS])
 def test_method_stays_within_its_measured_error_of_the_truth(name, end, method, rtol, measured):
-    """RUNS has the measured errors (of the length, or rad), CROSSINGS those of the series method behind
-    singular positions; 10 times as much is allowed."""
+    """RUNS has measured errors (of the length, or rad), CROSSINGS the errors of `taylor` after singular
+    positions. A run may have ten times its measured error."""
     error = relative_error(run_of(SCENES[name](), end, method, rtol), SCENES[name]())
     assert error < MARGIN * measured, f"{name}, {method}: error {error:.2e}, measured {measured:.1e}"
 

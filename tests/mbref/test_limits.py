@@ -20,7 +20,7 @@ WRONG = (-1.0, math.nan, math.inf, 5e-324, 10**400, "1", True, [1.0])
     ids=repr,
 )
 def test_limit_that_is_no_finite_number_in_its_interval_is_refused_by_name(name, value):
-    """Intervals of tolerances exclude 0, and that of rtol also 1."""
+    """A tolerance of 0 is refused, and an rtol of 1, too."""
     with pytest.raises(ValueError, match=f"^{name}: must be "):
         Limits(**{name: value})
 

@@ -288,8 +288,8 @@ def turned_back(angle: float, distance: float) -> Scene:
 
 @pytest.mark.parametrize("distance", [0.0, 1e-9, 1e-8])
 def test_no_run_whose_driver_turns_back_at_the_flat_position_completes_on_another_branch(distance):
-    """After 1 s the driver is at its first angle, and so is the parallelogram, to 1e-6 m, unless rounding
-    changed the branch where it turned back. Such runs must end UNDECIDED."""
+    """After 1 s the driver has its angle of the start, and the bodies are at their first places, to 1e-6 m. A
+    run in which rounding changes the branch where the driver turns back must end UNDECIDED."""
     for angle in np.linspace(0.3, 0.9, 20):
         scene = turned_back(float(angle), distance)
         run = simulate(scene, "taylor", [1.0])

@@ -109,7 +109,7 @@ class Simulation:
             raise unknown_family("pinocchio", family)
 
     def hold(self, closures: Sequence[Any]) -> None:
-        """Let constraint models, and no other ones, hold from now on."""
+        """Replace the constraints that hold by the given constraint models."""
         pin = self.pin
         self.closures = pin.StdVec_RigidConstraintModel()
         self.closures.extend(closures)

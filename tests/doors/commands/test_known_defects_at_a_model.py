@@ -65,7 +65,7 @@ def turned(name: str) -> Scene:
 
 
 def welded() -> Scene:
-    """Return an arm with a tip, which two hinges on one axis and a ball beside it hold."""
+    """Return an arm on a hinge; two hinges on one axis and a ball joint hold a tip to the arm."""
     arm = {"name": "arm", "mass": 1.0, "inertia": [0.05, 0.06, 0.07], "position": (0.3, 0.1, 0.2)}
     tip = arm | {"name": "tip", "position": (0.8, 0.3, 0.1)}
     place, axis = np.array([0.5, 0.0, 0.0]), np.array([0.6, 0.48, 0.64])

@@ -152,8 +152,8 @@ def test_table_of_records_names_the_faulty_field(commands, changes, said, tmp_pa
 
 @pytest.mark.parametrize(("command", "record"), [("convergence", RECORD), ("invariants", INVARIANT)])
 def test_table_of_records_names_those_that_it_cannot_show(command, record, tmp_path, capsys):
-    """Of a mechanism or experiment that is not in the table. An incomplete line is named, and a whole one is
-    read without its end."""
+    """The record is of a mechanism or experiment that is not in the table. The command names an incomplete
+    line, and reads a complete line that has no line end."""
     lost = {**record, "key": "k2", "engine": "none", "row": "none, tuned", "experiment": "none"}
     assert table(command, tmp_path, lost) == 0
     assert capsys.readouterr().err == "no row and column of the table has record 'k2'\n"
@@ -164,7 +164,7 @@ def test_table_of_records_names_those_that_it_cannot_show(command, record, tmp_p
 
 
 def test_records_of_another_mechanism_than_the_scene_file_are_named_and_not_left_out(tmp_path, capsys):
-    """A record names its mechanism by a digest, here another one than that of the only scene."""
+    """A record has the digest of its mechanism; here the digest differs from the digest of the only scene."""
     place = folder(tmp_path / "report", record_with("mechanism", "0123456789abcdef"))
     assert report(["--render", str(place)]) == 2
     assert "records of four_bar are of another mechanism" in capsys.readouterr().err

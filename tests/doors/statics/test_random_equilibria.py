@@ -69,7 +69,7 @@ def test_eigenvalues_of_two_equilibria_of_a_leg_of_seven_links_are_the_judges():
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(5, 215, 10))
 def test_eigenvalues_of_many_mechanisms_agree_with_the_judges_within_their_bounds(first):
-    """Of each ten mechanisms one or more have an equilibrium. Differences over bounds are at most 1."""
+    """At least one of ten mechanisms has an equilibrium. Each difference is at most its bound."""
     found = [each for seed in range(first, first + 10) for each in judged(at_rest(seed), starts=3)]
     assert found and max(each.acceleration for each in found) < BALANCED
     assert max(each.eigenvalues for each in found) <= 1
