@@ -71,7 +71,7 @@ class Shape(BaseModel):
     @model_validator(mode="after")
     def _is_of_a_row_and_a_run(self) -> Shape:
         if not self.row.startswith(f"{self.engine}, "):
-            raise ValueError(f"row must begin with the engine, {self.engine!r}")
+            raise ValueError(f"row must begin with {f'{self.engine}, '!r}, the engine and a comma")
         if self.outcome != REFUSED and not {"x", "values"} <= self.model_fields_set:
             raise ValueError("x and values are required of a run")
         return self

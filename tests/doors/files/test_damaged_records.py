@@ -123,31 +123,37 @@ def table(command: str, place: Path, record: Any, end: bytes = b"\n") -> int:
     return crosscheck([command, "--records", str(path)])
 
 
-@pytest.mark.parametrize(
-    ("commands", "changes", "said"),
-    [
-        (("closed-loops", "convergence"), {"cost": None}, "cost: field required"),
-        (("closed-loops", "convergence"), {"cost": {"seconds": 1.0}}, "cost.steps: field required"),
-        (("closed-loops", "convergence"), {"outcome": ["COMPLETED"]}, "outcome: input should be"),
-        (("closed-loops", "convergence"), {"outcome": "REFUSED"}, "owner: field required"),
-        (
-            ("closed-loops", "convergence"),
-            {"asked": {"engine": "mbref", "options": {"step": "short"}}},
-            "asked.options: step: must be a positive number",
-        ),
-        (("invariants",), {"row": "mujoco"}, "row must begin with the engine, 'mujoco'"),
-        (("invariants",), {"values": None}, "x and values are required of a run"),
-        (("invariants",), {"x": "1"}, "x: input should be a valid number"),
-    ],
-    ids=lambda value: str(value)[:20],
-)
-def test_table_of_records_names_the_faulty_field(commands, changes, said, tmp_path, capsys):
-    """A field has another value, or is missing (None)."""
-    for command in commands:
-        record = {**(INVARIANT if command == "invariants" else RECORD), **changes}
-        assert table(command, tmp_path, {k: v for k, v in record.items() if v is not None}) == 2
-        shown = capsys.readouterr().err
-        assert said in shown and shown.count("\n") == 1
+RUNS = {  # faulty fields of a run's record, and the words that name them
+    "cost is missing": ({"cost": None}, "cost: field required"),
+    "cost has no steps": ({"cost": {"seconds": 1.0}}, "cost.steps: field required"),
+    "outcome is a list": ({"outcome": ["COMPLETED"]}, "outcome: input should be"),
+    "refusal has no owner": ({"outcome": "REFUSED"}, "owner: field required"),
+    "step is a word": (
+        {"asked": {"engine": "mbref", "options": {"step": "short"}}},
+        "asked.options: step: must be a positive number",
+    ),
+}
+EXPERIMENTS = {
+    "row is an engine's name": ({"row": "mujoco"}, "row must begin with 'mujoco, ', the engine and a comma"),
+    "row has another engine": ({"row": "mbref, tuned"}, "row must begin with 'mujoco, '"),
+    "values are missing": ({"values": None}, "x and values are required of a run"),
+    "x is text": ({"x": "1"}, "x: input should be a valid number"),
+}
+RIGHT = {"closed-loops": RECORD, "convergence": RECORD, "invariants": INVARIANT}  # by the command of a table
+TABLES = [
+    (command, fault) for command in RIGHT for fault in (EXPERIMENTS if command == "invariants" else RUNS)
+]
+
+
+@pytest.mark.parametrize(("command", "fault"), TABLES)
+def test_table_of_records_names_the_faulty_field(command, fault, tmp_path, capsys):
+    """A field has another value, or is missing (None). The table of the right record is printed."""
+    record, (changes, said) = RIGHT[command], (RUNS | EXPERIMENTS)[fault]
+    faulty = {name: value for name, value in {**record, **changes}.items() if value is not None}
+    assert table(command, tmp_path, faulty) == 2
+    shown = capsys.readouterr().err
+    assert said in shown and shown.count("\n") == 1
+    assert table(command, tmp_path, record) == 0
 
 
 @pytest.mark.parametrize(("command", "record"), [("convergence", RECORD), ("invariants", INVARIANT)])
