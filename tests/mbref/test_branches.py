@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance.mechanisms.parts import linkage
+from crosscheck.judge.truth import closed_form
 from mbref.cli import main
 from mbref.design.along_motion import along_motion
 from mbref.equations.branches import ALONE, MULTIPLE, second_order
@@ -38,8 +39,8 @@ def test_flat_rhombus_lists_its_smooth_and_its_folding_branch():
 
 
 def test_flat_five_bar_has_one_branch_at_every_crossing():
-    """A second rocker keeps the coupler parallel to the ground, so that it cannot fold. In 0.05 s the crank
-    turns by 6.24 rad from π/2 and is flat at 0 and -π."""
+    """A bar keeps the coupler parallel to the ground, so that it cannot fold. In 0.05 s the
+    crank turns by 6.24 rad from π/2 and is flat at 0 and -π."""
     crossings = simulate(five_bar(), "taylor", [0.05]).crossings
     assert len(crossings) == 2 and {c.sentence for c in crossings} == {ALONE}
 
@@ -182,9 +183,15 @@ def test_straight_arch_has_one_first_order_freedom_and_one_second_order_conditio
 
 
 def test_diagnosis_lists_the_three_crossings_of_a_swinging_rhombus():
-    """In its duration it swings three times through the flat position, where the coupler may fold."""
-    found = along_motion(four_bar_gravity(0.3))
+    """Its links hang: released at θ = 0.3 rad they swing through 0 and -π, turn at -π - 0.3 rad and pass -π
+    again within 1 s. The crank of the closed form is level, y = 0, at these times."""
+    scene = four_bar_gravity(0.3)
+    found = along_motion(scene)
     assert [c.sentence for c in found.crossings] == ["2 branches"] * 3
+    height = closed_form(scene).poses(np.linspace(0.0, 1.0, 201)).position[:, 0, 1]  # m, of the crank
+    assert np.count_nonzero(np.diff(np.sign(height))) == 3
+    level = closed_form(scene).poses([c.time for c in found.crossings]).position[:, 0, 1]
+    assert np.abs(level).max() < 1e-9  # m; rtol of the motion
 
 
 def test_diagnosis_calls_a_straight_arch_shaky():

@@ -156,10 +156,14 @@ def test_only_the_other_of_two_hinges_is_removed_if_one_has_an_armature_or_a_cou
     assert exchanges(scene, most=20) == [{"lower": "removed"}]
 
 
-def test_redundancy_of_a_second_rocker_of_equal_length_is_not_removed_by_exchanges():
-    """The five-bar has redundant rows, one of them in the plane: the equal lengths of its rockers, not their
-    joints, make it redundant, so that no exchange of joints is proposed."""
-    assert exchanges(find_scene("five_bar")) == [] and counts(find_scene("five_bar")).redundant > 0
+def test_no_exchange_ends_the_redundancy_of_a_second_coupler_of_equal_length():
+    """``exchanges`` lists only sets that end all redundancy. The five-bar is the four-bar with a bar on two
+    hinges parallel to the coupler: 24 coordinates, 28 rows and one freedom, so that 5 rows are redundant. One
+    of them is redundant in the plane, by equal lengths, which no joint type changes. Without the bar, a ball
+    at B or C ends all redundancy."""
+    assert counts(find_scene("five_bar_gravity")).redundant == 28 - (24 - 1)
+    assert exchanges(find_scene("five_bar_gravity")) == []
+    assert exchanges(find_scene("four_bar_gravity")) == [{"B": BALL}, {"C": BALL}]
 
 
 def test_diagnosis_along_a_motion_finds_the_singular_position_of_equal_crank_and_rod():

@@ -15,6 +15,7 @@ from mbref.scenes.five_bar import five_bar_gravity
 from mbref.scenes.four_bar import four_bar_gravity
 from mbref.scenes.planar_slider_crank import slider_crank
 from tests.crosscheck.measured import relative_error
+from tests.helpers.parts import hinge, rod
 
 WATCHING = (
     "alf-dual+projection",
@@ -64,10 +65,15 @@ def test_run_that_watches_the_rank_ends_at_the_first_singular_position(loop, met
     [LOOPS["four"][0], LOOPS["five"][0], find_scene("four_bar_chain[3]")],
     ids=lambda scene: scene.name,
 )
-def test_message_names_the_joints_that_lose_rank(scene):
-    """All joints of a loop take part where its links are in line; three loops of a chain are flat at once."""
-    message = simulate(scene, "alf-dual+projection", [2.0]).message
-    assert all(repr(joint.name) in message for joint in scene.joint), message
+def test_message_names_the_joints_that_lose_rank_and_no_joint_beside_them(scene):
+    """All joints of a loop take part where its links are in line; three loops of a chain are flat at once.
+    The hinge of a pendulum beside them does not."""
+    beside = (rod("bob", (9.0, 0.0, 0.0), (9.5, 0.0, 0.0)), hinge("beside", "ground", "bob", (9.0, 0.0, 0.0)))
+    both = Scene.model_validate(
+        {**scene.model_dump(), "body": [*scene.body, beside[0]], "joint": [*scene.joint, beside[1]]}
+    )
+    message = simulate(both, "alf-dual+projection", [2.0]).message
+    assert [j.name for j in both.joint if repr(j.name) not in message] == ["beside"], message
 
 
 def test_recorded_pose_of_a_flat_parallelogram_has_all_bodies_on_its_line():

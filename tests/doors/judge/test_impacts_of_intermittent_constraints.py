@@ -104,18 +104,43 @@ def test_wrong_impacts_are_measured():
         assert measure(scene, wrong)[name] > 1e-3
 
 
-@pytest.mark.parametrize("name", SETTINGS)
-@pytest.mark.parametrize("make", [carts, rotors, caught])
-def test_engines_switch_constraints_or_refuse_them_by_name(make, name):
-    """MuJoCo switches equalities, Pinocchio constraint models, which couple no coordinates."""
+SWITCHED = {  # m, m/s, rad/s; five times the error of MuJoCo's steps of 1 ms with soft equalities
+    "position": 1e-8,
+    "velocity": 1e-7,
+    "angular_velocity": 1e-7,
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "make"),
+    [("mujoco", carts), ("mujoco", rotors), ("mujoco", caught), ("pinocchio", carts), ("pinocchio", caught)],
+)
+def test_engine_with_switched_constraints_moves_as_the_judges_reference(name, make):
+    """MuJoCo switches equalities, Pinocchio constraint models; the judge's reference has no engine's code."""
     scene, times = make(), np.linspace(0.0, make().duration, 5)
-    if name == "pinocchio" and scene.coupling:
-        assert "couples no joint coordinates" in str(engine(name).cannot(scene))
-        return
     run = engine(name).run(scene, times, SETTINGS[name])
     exact = motion_by(natural_motion, scene, times, EXTENDED)
-    assert np.abs(run.position - doubles(exact.position)).max() <= 1e-8
-    assert measure(scene, run)["impact_error"] <= CLOSE
-    assert "active has intervals" in str(engine("exudyn").cannot(scene))
+    for field, limit in SWITCHED.items():
+        assert np.abs(getattr(run, field) - doubles(getattr(exact, field))).max() <= limit, field
+
+
+def test_pinocchio_refuses_a_coupling_with_intervals_by_its_name():
+    """Pinocchio's constraint models join frames, and none joins coordinates. It takes carts with a latch."""
+    refusal = str(engine("pinocchio").cannot(rotors()))
+    assert refusal.startswith("coupling 'clutch': constraintDynamics couples no joint coordinates")
+    assert engine("pinocchio").cannot(carts()) is None
+
+
+def test_exudyn_refuses_each_part_with_intervals_by_its_name():
+    """Its adapter maps no intervals. It takes the carts if their latch always holds."""
+    refusals = [str(engine("exudyn").cannot(scene)) for scene in (carts(), rotors())]
+    expected = ["joint[L].active has intervals", "coupling[clutch].active has intervals"]
+    assert [refusal.partition(",")[0] for refusal in refusals] == expected
+    assert engine("exudyn").cannot(carts(active=None)) is None
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_engine_refuses_a_hinge_with_intervals_by_its_name(name):
+    """The adapters switch constraints of a point or a frame; a hinge, here the latch 'L', has an axis."""
     hinged = carts(type="revolute", anchor=[0, 0, 0], axis=[0, 0, 1])
-    assert "joint 'L' of type 'revolute' has intervals" in str(engine(name).cannot(hinged))
+    assert str(engine(name).cannot(hinged)).startswith("joint 'L' of type 'revolute' has intervals")
