@@ -8,6 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from mbref.simulation import VERSION
+
 if TYPE_CHECKING:
     from mbref.design.along_motion import AlongMotion, along_motion
     from mbref.design.diagnosis import Diagnosis, diagnose
@@ -33,7 +35,7 @@ if TYPE_CHECKING:
     from mbref.simulation.sweep import sweep
     from mbref.simulation.terms import terms
 
-__version__ = "0.2.0"
+__version__ = VERSION
 
 _PUBLIC = {  # module → its public names
     "design.along_motion": ("AlongMotion", "along_motion"),

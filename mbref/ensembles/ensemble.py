@@ -21,12 +21,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mbref import __version__, records
+from mbref import records
 from mbref.ensembles.processes import processes
 from mbref.ensembles.simulate_all import Ended, run_all
 from mbref.method import Method, crossing_method
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
+from mbref.simulation import VERSION
 from mbref.simulation.simulate import Limits, checked_times, prepare
 
 AHEAD = (
@@ -195,7 +196,7 @@ class Work:
 
     def _crashed(self, job: Job) -> Trajectory:
         return Trajectory.failed(
-            scene=job.scene.name, engine="mbref", version=__version__, method=str(Method.parse(self._method)),
+            scene=job.scene.name, engine="mbref", version=VERSION, method=str(Method.parse(self._method)),
             settings=asdict(self._limits), bodies=tuple(body.name for body in job.scene.body),
             outcome=Outcome.CRASHED, message="its process was killed",
         )  # fmt: skip
@@ -223,5 +224,5 @@ def _handed_out(work: Work, path: str | Path | None) -> Iterator[tuple[int, Traj
 
 def _key(scene: Scene, times: np.ndarray, method: str, limits: Limits) -> str:
     """Return the hash of everything that determines a result."""
-    identity = [scene.to_dict(), times.tolist(), str(method), asdict(limits), __version__]
+    identity = [scene.to_dict(), times.tolist(), str(method), asdict(limits), VERSION]
     return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from mbref import __version__
 from mbref.equations.branches import Passed, branches_passed, tangents
 from mbref.equations.initial_state import Start
 from mbref.equations.joint_reactions import lazy_reactions
@@ -21,6 +20,7 @@ from mbref.motions.motion import Motion
 from mbref.motions.trajectory import Cost, Outcome
 from mbref.scene import Scene
 from mbref.scene.structure import bushings
+from mbref.simulation import VERSION
 from mbref.simulation.advice import advice_on_rounding, remedy
 from mbref.simulation.end_positions import ROUNDED, Met, is_at_dead_position, is_near, met_by
 from mbref.simulation.runs import trial_of
@@ -125,7 +125,7 @@ def facts_of(run: Run) -> dict[str, Any]:
     return {
         "scene": run.scene.name,
         "engine": "mbref",
-        "version": __version__,
+        "version": VERSION,
         "method": str(run.method),
         "settings": {
             **vars(run.limits),

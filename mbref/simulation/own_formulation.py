@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbref import __version__
 from mbref.equations.counts import freedoms_left
 from mbref.equations.driver_conflicts import refuse_conflict
 from mbref.equations.initial_state import consistent_start, position_weights, solve_positions
@@ -27,6 +26,7 @@ from mbref.method import OWN
 from mbref.motions.motion import Motion
 from mbref.motions.trajectory import Cost, Outcome
 from mbref.scene import Scene, SceneError
+from mbref.simulation import VERSION
 from mbref.stepping.control import UNWRAPPED, largest_violation
 from mbref.stepping.limits import Limits
 from mbref.stepping.run import missing_masses
@@ -241,7 +241,7 @@ class _OwnRun:
             mechanism=self.scene,
             scene=self.scene.name,
             engine="mbref",
-            version=__version__,
+            version=VERSION,
             method=self.method,
             settings={**vars(self.limits), "branches": []},
             bodies=tuple(body.name for body in self.scene.body),
