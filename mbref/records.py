@@ -127,7 +127,7 @@ def rewrite(path: str | Path, records: Iterable[Mapping[str, Any]]) -> None:
     if Path(path).suffix == ".xz":
         import lzma
 
-        text = lzma.compress(text)
+        text = lzma.compress(text, preset=lzma.PRESET_DEFAULT | lzma.PRESET_EXTREME)
     files.write(path, text)
 
 

@@ -21,6 +21,7 @@ from crosscheck.processes.pool import ask, end_idle
 from crosscheck.refusals import shortened
 from crosscheck.study.provenance import made_by
 from crosscheck.study.record_shape import Record, checked
+from crosscheck.study.store import in_digits
 from mbref.motions.trajectory import Outcome
 from mbref.records import looked_at, rewrite
 from mbref.scene import Scene
@@ -101,7 +102,7 @@ def _record(name: str, number: int, known: Collection[Record]) -> Record:
         "seed": number,
         "scene": scene.name,
         "bodies": len(scene.body),
-        "clearance": _rounded(min(factors.clearance for factors in held)),
+        "clearance": in_digits(float(min(factors.clearance for factors in held)), DIGITS),
         "redundant": len(rows) - sum(factors.rank for factors in held),
         "refused": refused,
         "groups": [] if refused else _groups(name, scene),
@@ -145,11 +146,7 @@ def compared(runner: Runner, scene: Scene, given: Alternatives) -> Record:
     return {
         "within": given.within,
         "ended": {name: ended.get(name, "") for name in runs},
-        "seconds": {name: _rounded(run.cost.seconds) for name, run in runs.items()},
-        "off": {name: _rounded(value) for name, value in off_from_gauss(scene, ways, 0).items()},
-        "pairs": [[*pair.ways, _rounded(pair.size), pair.quantity, pair.body] for pair in pairs],
+        "seconds": in_digits({name: run.cost.seconds for name, run in runs.items()}, DIGITS),
+        "off": in_digits(off_from_gauss(scene, ways, 0), DIGITS),
+        "pairs": [[*pair.ways, in_digits(pair.size, DIGITS), pair.quantity, pair.body] for pair in pairs],
     }
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")

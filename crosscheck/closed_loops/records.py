@@ -10,7 +10,7 @@ import numpy as np
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES, Difficulty
 from crosscheck.study.grid import Case, Record, key, study
 from crosscheck.study.search.offers import Unable, default_cases
-from crosscheck.study.store import REFUSED, read_runs, refusal, short
+from crosscheck.study.store import REFUSED, read_runs, refusal, short, short_key
 from mbref.motions.trajectory import Outcome
 from mbref.records import rewrite
 
@@ -47,7 +47,7 @@ def cases(
 def _is_too_long(case: Case, record: Record) -> bool:
     """Return whether a case ends after its time limit by the record of its run, or by the record of a run
     with a longer step: the CPU time is inversely proportional to the step."""
-    if record["key"] == key(case):
+    if record["key"] == short_key(key(case)):
         return record["outcome"] == Outcome.TIMED_OUT.label
     names = (case.engine, case.scene.name, case.setting.family)
     is_other = names != (record["engine"], record["scene"], record.get("family"))
@@ -74,7 +74,7 @@ def measure(
         if progress:
             progress(done, total, record)
 
-    study([case for case in wanted if key(case) not in known], progress=store)
+    study([case for case in wanted if short_key(key(case)) not in known], progress=store)
 
 
 def _store(record: Record, path: Path) -> None:

@@ -18,7 +18,7 @@ from crosscheck.setting import TOLERANCES
 from crosscheck.study.grid import Case, Record, key, run_in_turn, study
 from crosscheck.study.record_view import ended, error, error_bound, is_completed
 from crosscheck.study.search.offers import default_cases
-from crosscheck.study.store import read_runs, refusal, short
+from crosscheck.study.store import read_runs, refusal, short, short_key
 from mbref.records import rewrite
 
 FILE = Path(__file__).parent / "records.jsonl.xz"
@@ -179,11 +179,11 @@ def measure(
     with ThreadPoolExecutor(1) as one:
 
         def run(case: Case) -> Record:
-            if key(case) not in known:
+            if (name := short_key(key(case))) not in known:
                 [made] = study([case], one, run=run_in_turn)
-                known[made["key"]] = short(made)
+                known[name] = short(made)
                 report(f"{made['engine']} {made['family']} {made['scene']}: {point(made)}")
-            return known[key(case)]
+            return known[name]
 
         for row in (row for row in rows if row.engine in engines):
             for mechanism in mechanisms:

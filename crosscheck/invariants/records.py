@@ -16,7 +16,7 @@ from crosscheck.processes.pool import end_idle, run_isolated
 from crosscheck.study.grades import DEFAULTS
 from crosscheck.study.provenance import made_by
 from crosscheck.study.record_shape import Record, checked
-from crosscheck.study.store import REFUSED
+from crosscheck.study.store import REFUSED, in_digits
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.records import looked_at, rewrite
 
@@ -131,7 +131,7 @@ def made(row: Row, experiment: Experiment) -> Iterator[Record]:
         record = last = _record(asked, row, experiment) | _of_run(x, setting, run)
         if run.outcome is Outcome.COMPLETED:
             base = base or run
-            record["values"] = dict(experiment.measure(scene, run, x, base))
+            record["values"] = in_digits(dict(experiment.measure(scene, run, x, base)))
         yield record | {"key": f"{record['key']} {x:g}"}
 
 
@@ -181,6 +181,6 @@ def _of_run(x: float, setting: Setting, run: Trajectory) -> Record:
         "options": dict(setting.options),
         "outcome": run.outcome.label,
         "message": run.message,
-        "seconds": run.cost.seconds,
+        "seconds": in_digits(run.cost.seconds),
         "values": {},
     }

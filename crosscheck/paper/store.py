@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 from crosscheck.judge.metrics import violation_series
 from crosscheck.paper.runs import GROWTH, PEAKS, Cases, Label, Records
 from crosscheck.study.grid import Case, Record, key, run_in_turn, study
 from crosscheck.study.progress import Shown
-from crosscheck.study.store import read
+from crosscheck.study.store import in_digits, read
 from mbref.files import write
 from mbref.motions.trajectory import Trajectory
 from mbref.records import RecordsError, json_content
@@ -48,7 +47,7 @@ def drawable(label: Label, scene: Scene, record: Record) -> Record:
     drawn = label.part in DRAWN_PARTS
     shown = list(record["bodies"].items())[: 1 if label == PEAKS else None]
     bodies = {
-        name: {field: _short(values if drawn else []) for field, values in motion.items()}
+        name: {field: in_digits(values if drawn else [], PLACES) for field, values in motion.items()}
         for name, motion in shown
     }
     return record | {
@@ -64,14 +63,7 @@ def drawable(label: Label, scene: Scene, record: Record) -> Record:
 
 def _violation(scene: Scene, record: Record) -> list[float]:
     values = violation_series(scene, Trajectory.from_record(scene.name, record), 0)
-    return [] if values is None else _short(values.tolist())
-
-
-def _short(values: Any) -> Any:
-    """Return nested lists of numbers rounded to PLACES significant digits."""
-    if isinstance(values, list):
-        return [_short(value) for value in values]
-    return float(f"{values:.{PLACES}g}")
+    return [] if values is None else in_digits(values.tolist(), PLACES)
 
 
 def index(path: str | Path, chosen: Cases) -> None:

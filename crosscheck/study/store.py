@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from pydantic import BaseModel
 
@@ -19,6 +20,8 @@ from mbref.scene import Scene, SceneError
 
 REFUSED = "REFUSED"  # outcome of a record without a run
 METRICS, ORIGIN = ("error", "error_bound", "violation_position"), ("time_limit", "commit", "date")
+DIGITS = 6  # of measured numbers in records without motions; tables show two
+KEY = 16  # hexadecimal digits of a key there: a thousand runs share one with a probability of 1e-13
 PACK = "records.zip"  # name of the file in which a folder's records and scenes are packed
 PACKED = ("*.jsonl", "*.json", "*.toml")
 MOTION = ("bodies", "reactions", "open_reactions", "angles", "crossings")  # fields of a run's motion
@@ -44,23 +47,42 @@ def read_scenes(folder: Path) -> list[Scene]:
 
 
 def read_runs(path: Path) -> list[Record]:
-    """Return runs without motions, and refusals, in their order; empty if there is no file.
+    """Return runs without motions, by short keys, and refusals, in their order; empty if there is no file.
 
     Raises RecordsError.
     """
     found = list(looked_at(path).values())
     for record in found:
-        checked(path, [record], Refused if record.get("outcome") == REFUSED else Measured)
+        is_refusal = record.get("outcome") == REFUSED
+        checked(path, [record], Refused if is_refusal else Measured)
+        if not is_refusal:
+            record["key"] = short_key(record["key"])
     return found
 
 
+def short_key(key: str) -> str:
+    """Return the key of a run's record without its motion."""
+    return key[:KEY]
+
+
 def short(record: Record) -> Record:
-    """Return a run's record with the fields that tables read, and with its origin."""
+    """Return a run's record with the fields that tables read, in DIGITS digits, and with its origin."""
     metrics, cost = record["metrics"], record["cost"]
+    measured = {name: metrics[name] for name in METRICS if math.isfinite(metrics.get(name) or 0.0)}
     return {name: record[name] for name in (*Measured.model_fields, *ORIGIN)} | {
-        "metrics": {name: metrics[name] for name in METRICS if math.isfinite(metrics.get(name) or 0.0)},
-        "cost": {name: cost[name] for name in Cost.model_fields},
+        "key": short_key(record["key"]),
+        "metrics": in_digits(measured),
+        "cost": in_digits({name: cost[name] for name in Cost.model_fields}),
     }
+
+
+def in_digits(values: Any, digits: int = DIGITS) -> Any:
+    """Return numbers in lists and dictionaries, rounded to significant digits; whole numbers stay."""
+    if isinstance(values, dict):
+        return {name: in_digits(value, digits) for name, value in values.items()}
+    if isinstance(values, list):
+        return [in_digits(value, digits) for value in values]
+    return float(f"{values:.{digits}g}") if isinstance(values, float) else values
 
 
 def refusal(key: str, scene: str, name: str, cannot: Cannot) -> Record:
