@@ -127,18 +127,18 @@ def test_spring_between_coincident_points_must_have_the_natural_length_zero():
     assert len(faults) == 1 and faults[0].startswith(f"load[{place}].natural_length: must be 0"), faults
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        (None, "cannot be read"),
-        (b"name = ", "is not TOML"),
-        (b"a = " + b"[" * 4000 + b"]" * 4000, "is nested too deeply"),
-        (b"a = " + b"1" * 5000, "is not TOML"),
-        (b"a = 0x" + b"f" * 5000, "a: is not a known field"),
-        (b'name = "\xff"', "is not UTF-8 text"),
-        (b"\x00", "is not TOML"),
-    ],
-)
+BROKEN = {
+    "missing": (None, "cannot be read"),
+    "not TOML": (b"name = ", "is not TOML"),
+    "too deep": (b"a = " + b"[" * 4000 + b"]" * 4000, "is nested too deeply"),
+    "decimal number of 5000 digits": (b"a = " + b"1" * 5000, "is not TOML"),
+    "hexadecimal number of 5000 digits": (b"a = 0x" + b"f" * 5000, "a: is not a known field"),
+    "not UTF-8": (b'name = "\xff"', "is not UTF-8 text"),
+    "a zero byte": (b"\x00", "is not TOML"),
+}
+
+
+@pytest.mark.parametrize(("text", "says"), BROKEN.values(), ids=BROKEN)
 def test_file_missing_broken_too_deep_too_long_or_not_text_is_a_scene_error(text, says, tmp_path):
     if text is not None:
         (tmp_path / "strange.toml").write_bytes(text)

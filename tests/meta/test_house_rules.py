@@ -55,6 +55,7 @@ def test_engine_is_imported_only_in_adapters_and_inside_functions():
     elsewhere = [path for path in FILES if not path.is_relative_to(adapters)]
     outside = {name(path): found for path in elsewhere if (found := imports(path) & ENGINE_PACKAGES)}
     assert not outside, outside
+    assert set().union(*map(imports, FILES)) >= ENGINE_PACKAGES, "imports that this rule does not see"
     at_import = {name(path): found for path in FILES if (found := imports(path, False) & ENGINE_PACKAGES)}
     assert not at_import, f"loaded when the file is imported: {at_import}"
 

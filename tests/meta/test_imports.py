@@ -145,6 +145,7 @@ def test_module_that_renders_reports_imports_nothing_that_makes_records():
         if module != "reports.__main__" and (names := sorted(filter(makes, of("reports", module))))
     }
     assert not wrong, f"{wrong}: records are made before, by crosscheck"
+    assert any(map(makes, of("reports", "reports.__main__"))), "the program makes records: the rule finds it"
 
 
 def test_program_reports_imports_only_command_line_modules_of_crosscheck():

@@ -15,11 +15,11 @@ from crosscheck.conformance.runners import InProcess
 from tests.zoo.defects import DEFECTS, engine
 from tests.zoo.table import FOR_REPORTS, data, page
 
-ON_ONE_BODY = {
-    "momenta": "tumbling body",
-    "passive": "pendulum",
-    "similar": "pendulum",
-    "distant": "pendulum",
+ON_ONE_BODY = {  # check of a law and its scene
+    "momenta": "tumbling body",  # momenta are constant without loads
+    "passive": "pendulum",  # the energy does not grow
+    "similar": "pendulum",  # a copy of 1 cm for 1 m has equal accelerations
+    "distant": "pendulum",  # a copy 1 km away has equal accelerations
 }
 SPECIMENS = {s.scene.name: s for s in [Specimen(undetermined()), *specimens()]}
 
@@ -50,8 +50,8 @@ def test_planted_defect_fails_its_check_which_the_sound_engine_passes(about):
 
 
 @pytest.mark.parametrize(("check", "scene"), ON_ONE_BODY.items())
-def test_a_law_that_a_defect_breaks_fails_on_one_body_too(check, scene):
-    """The gate's case of the defects of laws, whose scenes have several bodies."""
+def test_check_of_a_law_fails_on_one_body_with_a_planted_defect_and_passes_without(check, scene):
+    """The defect is the first that tests/zoo/defects.toml lists for the check; the laws hold for one body."""
     specimen = replace(SPECIMENS[scene], keeps="all")
     defect = next(defect for defect in DEFECTS.values() if defect.check == check)
     for planted, status in ((defect, suite.FAIL), (None, suite.PASS)):
