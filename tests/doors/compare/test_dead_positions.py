@@ -50,8 +50,14 @@ def test_singular_positions_of_a_driven_four_bar_are_no_dead_positions():
     assert end_of(SCENES["four_bar"](), 1.05 * turn) is None
 
 
-@pytest.mark.slow  # a reference of 2 CPU s
-@pytest.mark.parametrize("made", [lambda: turned(0.5, 0.4, 0.3, 4.0), lambda: pushed(0.2, 0.5, 1.0, 0.7)])
+@pytest.mark.parametrize(  # each a reference of 2 CPU s
+    "made",
+    [
+        pytest.param(lambda: turned(0.5, 0.4, 0.3, 4.0), marks=pytest.mark.slow),
+        lambda: pushed(0.2, 0.5, 1.0, 0.7),
+    ],
+    ids=["turned", "pushed"],
+)
 def test_comparison_with_even_samples_is_shortened_to_end_just_before_the_dead_position(made):
     """It keeps its 41 even samples, over at least 0.95 of the closed form's time."""
     scene, time = made()

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import crosscheck
+from crosscheck.recorded.changed_scenes import changes
 from mbref import rotations
-from mbref.scene import Scene
+from mbref.scene import Scene, TorsionSpring
 from mbref.scenes import find_scene
 from tests.helpers.tables import Table, damped_pendulum, double_pendulum, spinning_rod, switched_motor
 
@@ -311,6 +312,41 @@ def test_velocities_of_a_late_clock_are_explained_by_its_delay_where_a_load_is_s
     few = {n: c for n, c in table.items() if n == "time" or n.endswith(("velocity.x", "velocity.y"))}
     (found,) = crosscheck.judge_motion(switched_motor(), few).explanations
     assert found.sentence == "all columns: later by 0.0225 s"
+
+
+def test_damping_that_a_table_leaves_out_is_named_as_its_only_cause() -> None:
+    """A wheel of 16 rad/s with a damper for 0.2 s; the table has the angle and rate of the free wheel."""
+    free = spinning_rod().with_(duration=0.2)
+    times = np.linspace(0.0, free.duration, 9)
+    table = {n: c for n, c in motion(free, times).items() if n in ("time", "A.angle", "A.rate")}
+    damped = free.with_(load=[TorsionSpring(joint="A", stiffness=0.0, damping=0.15)])
+    (found,) = crosscheck.judge_motion(damped, table).explanations
+    assert found.sentence == "without the damping of load(0)" and found.remains < FITTED
+
+
+def test_each_number_of_a_scene_is_tried_as_a_cause() -> None:
+    """A change by -1 times a number leaves it out; a switch is earlier by the duration, 1 s."""
+    scene = switched_motor().with_(load=[*switched_motor().load, *damped_pendulum().load])
+    assert {change.says(-1.0) for change in changes(scene)} == {
+        "gravity of 0 m/s², not 9.81",
+        "without the torque of load(0)",
+        *(f"load(0) is switched {way} later by -1 s" for way in ("on", "off", "on and off")),
+        "without the stiffness of load(1)",
+        "without the damping of load(1)",
+        "without the armature of joint 'A'",
+        "body 'rod' has no mass",
+    }
+
+
+def test_search_for_a_cause_ends_when_the_clock_of_its_thread_has_gone_20_s(monkeypatch) -> None:
+    """This clock goes one second at each reading: 20 in the search, a few tens in the reference. The search reads
+    it before each of hundreds of causes; with the real clock it ends by itself within a second."""
+    table, clock = drifting(SCENES["spinning_rod"](), known("spinning_rod")), itertools.count()
+    few = {n: table[n] for n in ("time", "A.angle")}
+    assert crosscheck.judge_motion(spinning_rod(), few).is_complete
+    monkeypatch.setattr(time, "thread_time", lambda: float(next(clock)))
+    found = crosscheck.judge_motion(spinning_rod(), few, seconds=1e9)
+    assert not found.is_complete and 20 < next(clock) < 100
 
 
 @pytest.mark.slow

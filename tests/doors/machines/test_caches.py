@@ -1,4 +1,5 @@
-"""Caches: damaged, truncated, foreign, unwritable and concurrent ones cost time, never a result."""
+"""Caches: damaged, truncated, foreign, unwritable and concurrent ones cost time, never a result; none is
+loaded from a folder that others can write."""
 
 import itertools
 import multiprocessing
@@ -6,17 +7,18 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import pytest
 
-from mbref.kernels import checked_file
+from mbref.kernels import checked_file, disk_cache, safe_folder
 from mbref.kernels.compilation import PLAIN
 from mbref.simulation.simulate import simulate
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SMALL_KERNEL = """
 import sys
 sys.path.insert(0, {root!r})
@@ -51,6 +53,7 @@ define double @three_times(double %x) {{
 code = code_at(Path(sys.argv[1]) / "scene.code", lambda: THREE_TIMES)
 print(code.address("three_times") != 0)
 """
+USERS = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="needs users of POSIX")
 
 
 def test_file_is_read_as_it_was_written_and_nothing_else_is_left(tmp_path: Path):
@@ -183,6 +186,84 @@ def test_damaged_machine_code_is_reported_compiled_again_and_stored(script, patt
     assert files_in(cache, pattern) == files
     out, error = ran(script, tmp_path, cache)
     assert (out, "damaged" in error) == (says, False), error
+
+
+def kernel_of(cache: Path) -> Path:
+    """Return a new file in a folder of a cache, named as numba names the code of the function ``forked``."""
+    file = cache / f"{Path(__file__).parent.name}_1" / f"{Path(__file__).stem}.forked-1.nbc"
+    file.parent.mkdir(parents=True)
+    file.write_bytes(b"machine code")
+    return file
+
+
+@pytest.mark.parametrize("ahead", [-1e8, 5.0, 1e8])  # s: three years, or clocks that differ a little
+def test_damaged_code_of_a_kernel_is_removed_whatever_the_time_of_its_file(ahead, tmp_path: Path, capsys):
+    """Damage is found by a checksum. A whole file of that time stays."""
+    disk_cache.begin(tmp_path)
+    file = kernel_of(tmp_path)
+    disk_cache.record_files(tmp_path)
+    then = time.time() + ahead
+    for content, stays in ((b"machine code", True), (b"another code", False)):
+        file.write_bytes(content)
+        os.utime(file, (then, then))
+        disk_cache.remove_damaged(tmp_path, forked)
+        assert file.exists() == stays
+    assert capsys.readouterr().err == f"mbref: {file} is damaged and will be written again\n"
+
+
+@USERS
+@pytest.mark.parametrize("place", ["root", "version", "kernels"])
+def test_kernels_are_not_used_from_a_cache_in_which_others_can_write(place, tmp_path: Path, capsys):
+    """One of its three levels of folders has the mode 0777; others can reach all of them."""
+    version = tmp_path / "cache" / "version"
+    levels = {"root": version.parent, "version": version, "kernels": kernel_of(version).parent}
+    for folder in (tmp_path, *levels.values()):
+        folder.chmod(0o755)
+    levels[place].chmod(0o777)
+    assert not disk_cache.is_writable(version)
+    assert f"{levels[place]} can be written by other users (chmod go-w" in capsys.readouterr().err
+
+
+@USERS
+@pytest.mark.slow
+def test_program_compiles_anew_beside_a_cache_in_which_others_can_write(tmp_path: Path):
+    """A count of 1 means that the kernel was compiled. With the old mode of its folder it is loaded again."""
+    cache, script = tmp_path / "cache", SMALL_KERNEL + COUNT_COMPILATIONS
+    assert [ran(script, tmp_path, cache)[0] for _ in range(2)] == ["7.0\n1\n", "7.0\n0\n"]
+    for folder in (tmp_path, cache, *cache.iterdir()):
+        folder.chmod(0o755)
+    cache.chmod(0o777)
+    out, error = ran(script, tmp_path, cache)
+    assert out == "7.0\n1\n" and "can be written by other users" in error and "Traceback" not in error
+    cache.chmod(0o755)
+    assert ran(script, tmp_path, cache)[0] == "7.0\n0\n"
+
+
+@USERS
+def test_folders_of_a_new_cache_have_mode_0700_whatever_the_umask(tmp_path: Path):
+    """The umask 0 would give 0777."""
+    before = os.umask(0)
+    try:
+        safe_folder.make(tmp_path / "cache" / "version")
+    finally:
+        os.umask(before)
+    made = (tmp_path / "cache", tmp_path / "cache" / "version")
+    assert [folder.stat().st_mode & 0o777 for folder in made] == [0o700, 0o700]
+
+
+@USERS
+def test_no_data_are_written_to_or_read_from_a_folder_that_others_can_write(tmp_path: Path, capsys):
+    """The folder has the mode 0777. A folder of mode 0700 beside it is used, and one warning is printed."""
+    ours, open_to_all = tmp_path / "cache" / "ours", tmp_path / "cache" / "open"
+    checked_file.write(ours / "data", b"stored")
+    for folder in (tmp_path, ours.parent):  # which others can reach
+        folder.chmod(0o755)
+    open_to_all.mkdir()
+    open_to_all.chmod(0o777)
+    checked_file.write(open_to_all / "data", b"refused")
+    assert checked_file.read(ours / "data") == b"stored"
+    assert not (open_to_all / "data").exists() and checked_file.read(open_to_all / "data") is None
+    assert capsys.readouterr().err.count("can be written by other users") == 1
 
 
 @pytest.mark.parametrize(
