@@ -127,7 +127,6 @@ picture: $(VENV)/ready ## the README's moving picture, into reports/rendered/
 docs: $(VENV)/ready ## every page, schema and report that is made from code and committed records
 	mkdir -p build && $(BIN)/mbref schema > build/scene.schema.json && mv build/scene.schema.json mbref/templates/
 	$(BIN)/python docs/method_pages.py
-	$(BIN)/python -m tests.thresholds docs/results/thresholds.md
 	$(BIN)/python -m tests.zoo.table docs/results/conformance.md
 	$(BIN)/python -m reports.pages
 	$(BIN)/crosscheck report --render reports/reference

@@ -18,7 +18,7 @@ from ..markdown import body
 NAMES = (
     *("which-engine", "closed-loops", "convergence", "invariants", "alternatives", "small-motions", "files"),
     "real-files",
-    *("findings", "support"),
+    *("findings", "support", "thresholds"),
 )
 TEMPLATES = Path(__file__).parents[1] / "templates"  # texts of the pages, with names of parts in braces
 RESULTS = Path(__file__).parents[2] / "docs" / "results"

@@ -339,8 +339,8 @@ def test_each_number_of_a_scene_is_tried_as_a_cause() -> None:
 
 
 def test_search_for_a_cause_ends_when_the_clock_of_its_thread_has_gone_20_s(monkeypatch) -> None:
-    """This clock goes one second at each reading: 20 in the search, a few tens in the reference. The search reads
-    it before each of hundreds of causes; with the real clock it ends by itself within a second."""
+    """This clock goes one second at each reading: 20 in the search, a few tens in the reference. The search
+    reads it before each of hundreds of causes; with the real clock it ends by itself within a second."""
     table, clock = drifting(SCENES["spinning_rod"](), known("spinning_rod")), itertools.count()
     few = {n: table[n] for n in ("time", "A.angle")}
     assert crosscheck.judge_motion(spinning_rod(), few).is_complete

@@ -1,5 +1,6 @@
-"""Table of the thresholds of mbref outside ``mbref.taylor.crossing``, from the constants and their comments.
-``python -m tests.thresholds docs/results/thresholds.md`` writes the page."""
+"""The page on the thresholds of mbref outside ``mbref.taylor.crossing``: its constants and their comments."""
+
+from __future__ import annotations
 
 import ast
 import re
@@ -7,11 +8,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from mbref.command_line import Parser
-from reports.blocks import Fold, Table, Within
-from reports.markdown import body
+import mbref
 
-ROOT = Path(__file__).parents[1]
+from ..blocks import Block, Fold, Table, Within
+
+SOURCES = Path(mbref.__file__).parent
 LEFT_OUT = (
     "cli/",
     "motions/drawing/",
@@ -35,18 +36,6 @@ COSTS = {
     "STARTS", "STRIDE", "STEP_SHARES",
 }  # fmt: skip
 COLUMNS = ("file", "name", "value", "quantity and reason", "acts on")
-HEAD = """# Thresholds
-
-Numbers on which decisions of mbref depend, besides the thresholds at singular positions, which stand in
-`mbref/taylor/crossing/thresholds.py`. `python -m tests.thresholds docs/results/thresholds.md` writes this
-page from the constants and their comments.
-
-| acts on | meaning |
-|---|---|
-| result | a decision depends on the number; tests state what is decided, not the number |
-| cost | the number changes time, memory or the size of an output only |
-
-"""
 
 
 class Threshold(NamedTuple):
@@ -60,8 +49,8 @@ class Threshold(NamedTuple):
 
 def thresholds() -> list[Threshold]:
     """Return all numeric constants of mbref that have a comment."""
-    paths = sorted((ROOT / "mbref").rglob("*.py"))
-    names = [path.relative_to(ROOT / "mbref").as_posix() for path in paths]
+    paths = sorted(SOURCES.rglob("*.py"))
+    names = [path.relative_to(SOURCES).as_posix() for path in paths]
     chosen = [(name, path) for name, path in zip(names, paths, strict=True) if not name.startswith(LEFT_OUT)]
     return [found for name, path in chosen for found in constants(name, path.read_text())]
 
@@ -107,8 +96,8 @@ def _is_number(node: ast.expr) -> bool:
     return isinstance(node, ast.Dict) and all(map(_is_number, node.values))
 
 
-def page() -> str:
-    """Return the page: the number of thresholds in each folder of mbref, and a folded table for each."""
+def parts() -> dict[str, list[Block]]:
+    """Return ``tables``: the number of thresholds in each folder of mbref, and a folded table for each."""
     rows = dict[str, list[tuple[str, ...]]]()
     for each in thresholds():
         if each.name not in NUMBERS:
@@ -122,10 +111,4 @@ def page() -> str:
     ]
     overview = Table("Folders of mbref.", ("folder", "numbers", "of cost only"), counts, frozenset({1, 2}))
     tables = [Fold(folder, folder, [Table("Constants.", COLUMNS, of)]) for folder, of in rows.items()]
-    return f"{HEAD}{body([overview, *tables])}\n"
-
-
-if __name__ == "__main__":
-    parser = Parser(description=__doc__)
-    parser.add_argument("page", type=Path, help="the page that is written")
-    parser.parse_args().page.write_text(page())
+    return {"tables": [overview, *tables]}
