@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -15,6 +14,7 @@ import pytest
 from crosscheck.processes.child import Child, ChildFailed
 from mbref.motions.trajectory import Outcome
 from tests.helpers.fake_engines import converse
+from tests.helpers.processes import is_gone
 
 
 @pytest.fixture
@@ -57,13 +57,17 @@ def test_a_call_that_raises_ends_its_child_as_crashed(child: Child):
 
 
 @pytest.mark.parametrize("in_copy", [False, True], ids=["in the child", "in a forked copy"])
-@pytest.mark.parametrize(("function", "arguments"), [(time.sleep, (60.0,)), (pow, (3, 10**9))])
-def test_a_call_past_its_limit_times_out(child: Child, function, arguments, in_copy: bool):
-    """It sleeps, or computes 3 ** 10⁹, which holds the interpreter for hours; the child itself ends."""
-    child.call(operator.add, (2, 3), 60.0)  # the limit does not cover the start of the process
+@pytest.mark.parametrize("work", ["time.sleep(60)", "3 ** 10**9"], ids=["sleeps", "computes for hours"])
+def test_a_call_past_its_limit_times_out_and_its_processes_end(child: Child, tmp_path, work, in_copy: bool):
+    """The call writes its process number, then works past 0.5 s. The child ends, and so does its copy."""
+    number = child.call(os.getpid, (), 60.0).value  # the limit does not cover the start of the process
+    text = f"import os, pathlib, time; pathlib.Path({str(tmp_path / 'pid')!r}).write_text(str(os.getpid()))"
     with pytest.raises(ChildFailed, match=r"no result after 0\.5 s") as raised:
-        child.call(function, arguments, 0.5, in_copy)
-    assert raised.value.outcome is Outcome.TIMED_OUT and (in_copy or not child.is_alive)
+        child.call(exec, (f"{text}; {work}",), 0.5, in_copy)
+    assert raised.value.outcome is Outcome.TIMED_OUT
+    working = int((tmp_path / "pid").read_text())
+    assert (working != number) == in_copy, (working, number)
+    assert not child.is_alive and is_gone(working)
 
 
 def test_large_answers_arrive_whole(child: Child):

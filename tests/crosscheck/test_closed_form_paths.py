@@ -101,7 +101,10 @@ def test_a_moment_about_a_principal_axis_accelerates_the_spin_of_a_free_body():
 
 
 def test_a_body_on_one_hinge_or_on_two_coaxial_hinges_is_not_locked():
-    """Two hinges have ten constraint rows, of which five are redundant: one freedom is left."""
+    """Two hinges have ten constraint rows, of which five are redundant: one freedom is left. Hinges about z
+    and x leave none."""
+    crossed = pin("B", "ground", "bar", 0.0, 0.0, 0.0, axis=X)
+    assert locked(PENDULUM.with_(joint=(*PENDULUM.joint, crossed))).name == "locked"
     assert locked(PENDULUM) is None
     assert locked(PENDULUM.with_(joint=(*PENDULUM.joint, pin("B", "ground", "bar", 0.0, 0.0, 0.0)))) is None
 

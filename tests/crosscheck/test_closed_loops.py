@@ -54,7 +54,11 @@ def test_column_turned_has_the_four_bar_rotated_by_seven_tenths_of_a_radian() ->
 def test_cell_shows_the_grade_and_the_error_of_a_run(record, text) -> None:
     """Right ✓ up to 1e-8, close ≈ up to 1e-2, wrong ✗ above, ! ended early, – refused, ○ no record."""
     assert shown(record) == text
-    assert any(text[:1] == sign[:1] for sign in LEGEND), "the legend explains the sign"
+
+
+def test_legend_explains_every_sign_of_a_cell() -> None:
+    """The signs of the cells above; each line of the legend begins with one."""
+    assert {sign[:1] for sign in LEGEND} >= set("✓≈✗!–○")
 
 
 def test_cell_has_the_run_of_least_error_and_the_run_of_the_defaults() -> None:

@@ -30,10 +30,12 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
 
 
 def test_a_comparison_in_python_equals_the_json_of_the_command(compared, tmp_path, capsys):
+    """Their fields, the headline, and settings and metrics of all runs; times differ from run to run."""
     BLOCK.save(tmp_path / "block.toml")
     asked = ("compare", str(tmp_path / "block.toml"), "--engine", FAKE, "--samples", "3", "--json")
     assert main(asked) == 0
     printed = json.loads(capsys.readouterr().out)
+    assert printed["records"]
     compared.save(tmp_path / "saved.json")
     saved = json.loads((tmp_path / "saved.json").read_text())
     assert saved.keys() == printed.keys() and saved["verdict"]["headline"] == printed["verdict"]["headline"]

@@ -39,6 +39,8 @@ def test_an_estimate_that_needs_more_than_its_time_is_left_out_and_the_run_is_un
 
 
 def test_a_run_outside_a_study_has_no_estimate():
+    """`run_case` makes runs of a study, whose estimate is stored."""
+    assert run_case(Case(SCENE, TIMES, "mbref", LOOSE))["error_estimate"]["largest"] > 0
     assert run_isolated("mbref", SCENE, TIMES, LOOSE, 60.0).to_record()["error_estimate"] is None
 
 

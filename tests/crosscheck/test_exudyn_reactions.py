@@ -60,11 +60,16 @@ def test_exudyns_reaction_causes_the_acceleration_of_the_body(kind, driven, bodi
     )
 
 
-def test_exudyn_gives_no_reactions_with_an_accelerating_driver():
-    """Exudyn's initial multipliers leave the driver's acceleration out."""
-    driver = Driver(joint="J", sine=Sine(amplitude=0.1, frequency=3.0))
+def test_exudyn_gives_no_accelerations_and_reactions_with_an_accelerating_driver():
+    """Exudyn's initial multipliers leave it out. With a driver of constant rate both are given."""
     joint = Revolute.at("J", ("ground", "b"), **PLACES)
-    scene = Scene(name="shaken", body=(BODY,), joint=(joint,), driver=(driver,))
-    trajectory = ENGINE.run(scene, np.linspace(0, 0.1, 3), Setting("tuned", {"step": 1e-3}))
-    assert trajectory.reactions is None
-    assert trajectory.acceleration is None
+    shaken, turned = (
+        ENGINE.run(
+            Scene(name="driven", body=(BODY,), joint=(joint,), driver=(Driver(joint="J", **law),)),
+            np.linspace(0, 0.1, 3),
+            Setting("tuned", {"step": 1e-3}),
+        )
+        for law in ({"sine": Sine(amplitude=0.1, frequency=3.0)}, {"polynomial": (0.0, 3.0)})
+    )
+    assert shaken.reactions is None and shaken.acceleration is None
+    assert turned.reactions is not None and turned.acceleration is not None

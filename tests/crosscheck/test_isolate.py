@@ -28,6 +28,7 @@ from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from tests.helpers.fake_engines import FAKES, CompilingModels, converse
+from tests.helpers.processes import is_gone
 from tests.helpers.still_engines import resting as still
 
 TIMES = np.array([0.0, 0.1, 0.3])
@@ -43,16 +44,6 @@ def _children_of_its_own() -> Iterator[None]:
 
 def run(fake: str, scene: Scene | None = None, time_limit: float = 60.0) -> Trajectory:
     return run_isolated(f"{FAKES}:{fake}", scene or still(), TIMES, PLAIN, time_limit)
-
-
-def gone(pid: int) -> bool:
-    """Return whether the process ends within 5 s."""
-    for _ in range(100):
-        status = Path(f"/proc/{pid}/stat")
-        if not status.exists() or status.read_text().rsplit(")", 1)[1].split()[0] == "Z":
-            return True
-        time.sleep(0.05)
-    return False
 
 
 @pytest.mark.parametrize(
@@ -92,14 +83,14 @@ def test_every_observed_run_has_a_process_of_its_own_that_ends(tmp_path: Path):
     assert [one.printed for one in seen] == ["a banner\n"] * 3, seen
     processes = [int(line.split()[1]) for line in log.read_text().splitlines()]
     assert len(set(processes)) == 3, processes
-    assert all(gone(process) for process in processes), processes
+    assert all(is_gone(process) for process in processes), processes
 
 
 def test_an_observed_run_that_hangs_is_killed_with_the_processes_that_it_started(tmp_path: Path):
     pid = tmp_path / "pid"
     ended = observe(f"{FAKES}:HANG", still(str(pid)), TIMES, PLAIN, 2.0).value
     assert (ended.outcome, ended.message) == (Outcome.TIMED_OUT, "no result after 2 s"), ended.message
-    assert gone(int(pid.read_text())), f"grandchild {pid.read_text()} is still alive"
+    assert is_gone(int(pid.read_text())), f"grandchild {pid.read_text()} is still alive"
 
 
 def test_output_and_files_of_an_engine_do_not_reach_the_parent_process(capfd, tmp_path, monkeypatch):

@@ -23,9 +23,6 @@ from tests.helpers.parts import spring
 
 INSTALLED = pytest.mark.skipif(find_spec("newton") is None, reason="newton is not installed")
 STEP = 1e-3  # s
-# orders from 4 to 1 ms; the measured orders are 1.9 and 1.2. Finer steps of PADMM, and all steps of LOX with
-# the integrator Moreau (1.4e-4 to 6e-5), reach the tolerance of the iterations, where an error has no order.
-ORDERS = {"padmm, moreau": 2.0, "dvi": 1.0}
 # largest errors measured on the four-bar over 0.2 s at this step
 ERRORS = {
     "padmm, moreau": 6.3e-5,
@@ -86,13 +83,18 @@ def test_newton_s_solver_moves_a_four_bar_within_its_measured_error(family):
 
 @INSTALLED
 @pytest.mark.slow
-@pytest.mark.parametrize("family", ORDERS)
-def test_kamino_s_integrators_converge_with_their_order(family):
-    """Moreau's is of second order, Euler's of first; measured are 1.9 and 1.2 over 0.2 s of a four-bar at
-    steps of 4, 2 and 1 ms."""
-    lengths = np.array([4e-3, 2e-3, 1e-3])
-    order, _ = np.polyfit(np.log(lengths), np.log([error_of_four_bar(family, h) for h in lengths]), 1)
-    assert order == pytest.approx(ORDERS[family], abs=0.3)
+@pytest.mark.parametrize(
+    ("family", "order"),
+    [("padmm, moreau", 2), ("dvi", 1)],
+    ids=["solver PADMM, midpoint rule of Moreau", "solver DVI, Euler's method"],
+)
+def test_kamino_s_integrators_converge_with_their_order(family, order):
+    """The midpoint rule is of second order, Euler's method of first. Over 0.2 s of a four-bar the slope of
+    log error over log step is 1.9 and 1.2 from 4 to 1 ms, where terms of the next order still count: 0.3 is
+    allowed. Finer steps of PADMM reach the tolerance of its iterations, where an error has no order."""
+    lengths = np.array([4e-3, 2e-3, 1e-3])  # s
+    slope, _ = np.polyfit(np.log(lengths), np.log([error_of_four_bar(family, h) for h in lengths]), 1)
+    assert slope == pytest.approx(order, abs=0.3)
 
 
 @INSTALLED

@@ -182,10 +182,13 @@ def test_swash_plate_lifts_a_pin_as_its_closed_form(name: str, bodies: tuple[str
 
 
 def test_ondsel_s_accelerations_of_a_plane_between_moving_bodies_are_left_out() -> None:
-    """OndselSolver computes wrong accelerations there. The test above shows that the adapter gives
-    accelerations of a slider-crank on a plane of the ground."""
+    """OndselSolver computes wrong accelerations there. Accelerations of a driven slider-crank on a plane of
+    the ground are given."""
     scene, _ = swash_plate(("plate", "pin"))
+    grounded = guided()[1]
+    driven = grounded.with_(body=at_rest(grounded), driver=(Driver(joint="A", polynomial=(0.0, 30.0)),))
     assert run_fine("ondsel", scene, TIMES[:2]).acceleration is None
+    assert run_fine("ondsel", driven, np.array([0.0, 0.1])).acceleration is not None
 
 
 def referred(scene: Scene) -> Reference:

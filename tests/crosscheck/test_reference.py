@@ -36,6 +36,7 @@ from mbref.scenes import SCENES
 from tests.crosscheck.truth_scenes import ALL
 
 SMOOTH = 1e-12  # bound where nothing is singular
+CROSSED = 4e-10  # bound after singular positions: ten times the largest measured, of five_bar_gravity
 AGREE = 1e-15  # m, or of the length: difference of two formulations over a short smooth motion
 SECONDS = 200.0
 SEEDS = (2, 3, 4, 5, *range(10, 26))  # seeds of the random mechanisms in this file
@@ -87,14 +88,14 @@ def test_bound_of_a_mechanism_far_from_the_origin_holds_the_rounding_of_its_samp
     ],
 )
 def test_reference_is_within_its_bound_of_a_known_motion(name):
-    """The error is the difference from the closed form. The bound is at most SMOOTH, except for motions over
-    singular positions (SINGULAR), which magnify rounding."""
+    """The error is the difference from the closed form. The bound is at most SMOOTH, or CROSSED for motions
+    over singular positions (SINGULAR), which magnify rounding."""
     scene = ALL[name]
     found, reason = samples(scene, BRIEF.get(name, scene.duration))
     truth = closed_form(scene)
     assert not reason, reason
     assert (errors(scene, found, truth.poses(found.times)) <= found.bound).all()
-    assert found.bound.max() <= SMOOTH or name in SINGULAR
+    assert found.bound.max() <= (CROSSED if name in SINGULAR else SMOOTH)
 
 
 def test_reference_with_contradicting_joints_is_within_its_bound_of_the_exact_motion():

@@ -107,9 +107,13 @@ def test_run_that_ends_by_rounded_numbers_asks_for_twelve_digits():
     assert simulate(turned("planar_slider_crank", 12)).outcome == Outcome.COMPLETED
 
 
-def test_singular_start_gets_no_advice_on_rounding():
-    """The scenes start in a singular position, or have redundant rows, in full digits: the advice is empty. A
-    scene of 6 digits gets it (test above)."""
+def test_only_a_scene_with_rounded_numbers_gets_advice_on_rounding():
+    """Scenes that start in a singular position, or have redundant rows, get none in full digits; a
+    slider-crank of 6 digits gets it."""
+
+    def advice(scene: Scene) -> str:
+        return advice_on_rounding(start_run(scene, Method.parse("taylor"), np.array([0.1]), Limits()))
+
     for name in ("four_bar_straight", "four_bar_gravity", "sarrus"):
-        start = start_run(find_scene(name), Method.parse("taylor"), np.array([0.1]), Limits())
-        assert advice_on_rounding(start) == "", name
+        assert advice(find_scene(name)) == "", name
+    assert "with 12 digits" in advice(turned("planar_slider_crank", 6))

@@ -149,14 +149,14 @@ def test_scene_of_no_family_has_no_closed_form(why):
 
 
 def test_slider_crank_with_a_gap_of_3e_13_turns_back_as_with_1e_9():
-    """Crank and rod that differ by 3e-13 m or 1e-9 m are within 1e-4 m of each other behind the dead
-    position; a mechanism without a gap would go straight on."""
+    """Mechanisms whose crank and rod differ by 3e-13 m or 1e-9 m are within 1e-4 m of each other behind the
+    dead position; without a difference the mechanism goes straight on, and is over 2 cm away."""
     times = np.array([0.0, 0.095])
-    narrow, wide = (
+    narrow, wide, straight = (
         closed_form(slider_crank(0.308, 0.308 + gap, 0.3, "gap", rate=30.0)).poses(times).position
-        for gap in (3e-13, 1e-9)
+        for gap in (3e-13, 1e-9, 0.0)
     )
-    assert np.abs(narrow - wide).max() < 1e-4
+    assert np.abs(narrow - wide).max() < 1e-4 and np.abs(narrow - straight).max() > 0.02
 
 
 def door(tilt):

@@ -56,7 +56,7 @@ class Refusing(Fake):
 
 class NoSettings(Fake):
     def settings(self, scene: Scene) -> list[Setting]:
-        raise ValueError("none")
+        raise ValueError("no table of steps")
 
 
 class Hang(Fake):

@@ -99,7 +99,8 @@ def test_run_as_in_file_equals_steps_of_mujoco_on_its_own_model_of_the_file(tmp_
 
 
 def test_velocities_and_accelerations_of_the_files_model_are_differences_of_its_motion(tmp_path):
-    """Central differences over 2e-5 s; the limits are 1.5 to 5 times the measured relative differences."""
+    """Central differences over 2e-5 s. Relative differences of 2e-6 and 6.6e-4 are measured, the latter from
+    the fast vibration of the file's closures; 1e-5 and 1e-3 are allowed."""
     scene, h = imported(tmp_path, FOUR_BAR, TILTED), 1e-5
     setting = setting_of(scene, STIFFER_RK4)
     run = engine("mujoco").run(scene, np.array([0.1 - h, 0.1, 0.1 + h]), setting)
@@ -128,8 +129,10 @@ def test_families_of_the_files_model_are_offered_before_those_of_the_scene(tmp_p
     assert families[: len(FAMILIES)] == list(FAMILIES) and "tuned" in families[len(FAMILIES) :]
 
 
-def test_no_family_of_a_file_is_offered_for_other_engines_or_scenes(tmp_path):
+def test_families_of_a_file_are_offered_for_mujoco_and_scenes_from_files_alone(tmp_path):
+    """Exudyn reads no MJCF, and the built-in four-bar is from no file."""
     scene = imported(tmp_path, FOUR_BAR, TILTED)
+    assert of_file("mujoco", scene)
     assert not of_file("exudyn", scene) and not of_file("mujoco", SCENES["four_bar"]())
 
 

@@ -13,11 +13,11 @@ import pytest
 from crosscheck.engine import Setting
 from crosscheck.processes.pool import end_idle, run_isolated
 from mbref.motions.trajectory import Outcome
+from tests.helpers.processes import PATIENCE, is_gone
 from tests.helpers.still_engines import resting
 
 ENGINES = "tests.helpers.still_engines"
 ROOT = Path(__file__).parents[3]
-PATIENCE = 60.0  # s in which a killed process disappears on a loaded machine
 RUN = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell ignores it in jobs in the background
@@ -47,17 +47,6 @@ def log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """File to which engines append the numbers of their processes."""
     monkeypatch.setenv("STILL_LOG", str(tmp_path / "log"))
     return tmp_path / "log"
-
-
-def is_gone(process: int) -> bool:
-    """Return whether a process ends within PATIENCE."""
-    end = time.monotonic() + PATIENCE
-    while time.monotonic() < end:
-        status = Path(f"/proc/{process}/stat")
-        if not status.exists() or status.read_text().rsplit(")", 1)[1].split()[0] == "Z":
-            return True
-        time.sleep(0.02)
-    return False
 
 
 def numbers_in(log: Path) -> list[int]:
