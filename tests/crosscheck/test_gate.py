@@ -26,6 +26,7 @@ def short_run(scene, times=None):
 
 @pytest.mark.parametrize("name", CLOSED)
 def test_exact_motions_of_a_scene_pass_the_comparison_with_and_without_accelerations(name):
+    """``gate`` returns the first difference of short runs, or None."""
     run = short_run(SCENES[name]())
     found = gate(SCENES[name](), [run, replace(run, acceleration=None, angular_acceleration=None), run])
     assert found is None, f"{name}: {found}"

@@ -42,7 +42,8 @@ def simulate(scene: Scene, duration: float, family: str, **options) -> Trajector
 
 @pytest.mark.parametrize("name", PAPER)
 def test_tuned_mujoco_stays_within_its_measured_error_of_the_truth(name: str) -> None:
-    """PAPER has durations, steps, gains and measured errors; 10 times as much is allowed."""
+    """RK4 with hard closures ("tuned"). PAPER has durations, steps, gains and measured errors; 10 times as
+    much is allowed."""
     duration, step, beta, measured = PAPER[name]
     scene = SCENES[name]()
     run = simulate(scene, duration, "tuned", step=step, beta=beta, hard=HARD)
@@ -84,7 +85,8 @@ def test_integrated_accelerations_of_mujoco_stay_within_their_measured_error(nam
 
 
 def test_hardened_closures_are_closer_to_the_truth_than_stock_and_defaults() -> None:
-    """On the spatial slider-crank at a step of 1e-5 s: tuned < stock / 10, and stock < defaults / 1000."""
+    """On the spatial slider-crank at a step of 1e-5 s. By default closures return within 20 ms, in "stock"
+    within two steps, and in "tuned" they hardly open. Each is nearer to the truth: by 1000, then by 10."""
     scene = SCENES["spatial_slider_crank"]()
     options = {"defaults": {}, "stock": {}, "tuned": {"beta": 8000.0, "hard": HARD}}
     errors = {f: completed_error(simulate(scene, 0.02, f, step=1e-5, **o), scene) for f, o in options.items()}

@@ -78,7 +78,7 @@ def test_start_that_opens_a_joint_is_refused():
     ids=[*(make.__name__ for make, _, _ in OFFSETS), "three full turns and 1.15 rad", "two offsets"],
 )
 def test_judge_accepts_the_poses_that_mbref_assembles(scene):
-    """``started`` checks joints and couplings by the judge's equations, refuses violations (tests above)."""
+    """``started`` returns the assembled scene if joints and couplings hold by the judge's equations."""
     assert started(scene) == mbref.assembled(scene)
 
 

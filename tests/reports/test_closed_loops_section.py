@@ -30,7 +30,7 @@ def maps(section: list) -> tuple[HeatMap, HeatMap]:
 
 
 def test_best_cells_show_error_refusal_and_early_end(section):
-    """✓ right, ≈ inaccurate, – refused, ! ended early, ○ not run."""
+    """✓ right, ≈ inaccurate, – refused, ! ended early, ○ not run; with the cell's style on the page."""
     best, _ = maps(section)
     first = {name: (row[0].text, row[0].kind) for name, row in best.rows.items()}
     assert first == {
