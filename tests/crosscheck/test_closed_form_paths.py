@@ -166,14 +166,6 @@ def test_path_of_a_spatial_slider_crank_begins_at_the_pose_of_the_scene(line, or
 
 
 @of_cranks
-def test_path_of_a_spatial_slider_crank_knows_the_turned_angles_of_crank_and_block(line, order, reverse, way):
-    """The crank turns by its coordinate, the block by nothing; the rod turns about no fixed axis: NaN."""
-    turn = spatial_slider_crank(spatial(line, order, reverse, way)).poses(np.full(1, 0.4, np.longdouble)).turn
-    crank, rod, block = (order.index(name) for name in "crs")
-    assert turn[0, [crank, block]] == pytest.approx([0.4, 0.0]) and math.isnan(turn[0, rod])
-
-
-@of_cranks
 def test_only_a_driver_of_the_crank_prescribes_the_path_of_a_spatial_slider_crank(line, order, reverse, way):
     """A driver of the crank's hinge A has the path's sign 1; one of the slide D has none."""
     path = spatial_slider_crank(spatial(line, order, reverse, way))

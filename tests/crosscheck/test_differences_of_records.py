@@ -127,12 +127,6 @@ def test_runs_of_different_mechanisms_are_each_in_one_set_only():
     assert len(changes(old, new)) == 1, "a record that names no mechanism is compared"
 
 
-def test_runs_of_the_new_set_come_before_runs_of_the_old_set_alone():
-    old, new = one(1e-5), one(1e-4)
-    order = [change.identity for change in changes({"b": old["run"], "a": old["run"]}, {"a": new["run"]})]
-    assert order == ["a", "b"]
-
-
 def test_failed_runs_differ_by_their_outcome_or_by_their_end_beyond_rounding():
     """Ends of 0.5 s and 0.5 (1 + 1e-12) s are equal, ends of 0.5 and 0.25 s are not."""
 

@@ -216,14 +216,6 @@ def test_a_model_without_a_body_is_refused_by_its_file(tmp_path):
         formats.read(path)
 
 
-def test_two_hinges_of_one_body_about_one_axis_are_refused(tmp_path):
-    text = (MODELS / "four_bar.xml").read_text()
-    twice = text.replace('<joint name="B"/>', '<joint name="B"/><joint name="B2"/>')
-    (tmp_path / "twice.xml").write_text(twice)
-    with pytest.raises(SceneError, match="body 'coupler': joints hinge, hinge in a row have dependent"):
-        formats.read(tmp_path / "twice.xml")
-
-
 def test_roll_pitch_and_yaw_of_a_loop_turn_its_axis(tmp_path):
     """URDF turns about the fixed axes x, then y, then z."""
     text = (MODELS / "four_bar.urdf").read_text()

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from crosscheck.engines.shared.spanning_tree import GROUND_LINK, Link, Tree, effective_mass, spanning_tree
 from mbref import rotations
-from mbref.scene import JOINT_TYPES, Body, Coupling, Distance, Driver, Scene
+from mbref.scene import JOINT_TYPES, Body, Distance, Driver, Scene
 from mbref.scenes import SCENES
 from tests.crosscheck.tree_scenes import INERTIA, body, every_joint, ring
 from tests.helpers.parts import X, block, hinge, joint
@@ -192,18 +192,3 @@ def test_a_body_with_two_hinges_to_the_ground_is_split_if_the_ground_is_never_cu
     found = spanning_tree(two_loops, ("revolute",), between_links=True)
     assert [(c.kind, c.joint) for c in found.closures] == [("weld", 1), ("revolute", 2), ("revolute", 4)]
     assert sorted(link.mass for link in found.links) == [0.5, 0.5, 1.0]
-
-
-def test_drivers_couplings_and_armatures_name_the_coordinates_of_their_joints():
-    """The hinges j0, j1 and j2 of a chain have the coordinates 0, 1 and 2."""
-    chain = hinged(("ground", "a"), ("a", "b"), ("b", "c"))
-    geared = [joint.model_copy(update={"armature": 0.5 * k}) for k, joint in enumerate(chain.joint)]
-    scene = chain.with_(
-        joint=geared,
-        driver=(Driver(joint="j2", polynomial=(0.0, 1.0)),),
-        coupling=(Coupling(name="gears", joints=("j2", "j1"), ratio=3.0),),
-    )
-    tree = spanning_tree(scene)
-    assert tree.driven(scene) == [(2, scene.driver[0])]
-    assert tree.coupled(scene, scene.coupling[0]) == [2, 1]
-    assert tree.armatures(scene) == [(1, 0.5), (2, 1.0)]

@@ -248,11 +248,6 @@ def test_close_joins_two_frames_by_a_spherical_joint(tmp_path):
     assert difference(found, [("end_a", np.zeros(3), "end_b", np.zeros(3))]) < SAME
 
 
-def test_close_joins_two_frames_by_a_hinge_about_the_named_axis(tmp_path):
-    joint = read(tmp_path, open_chain(), "hinge.urdf", close=["end_a=end_b:revolute:y"]).imported.scene.joint
-    assert joint[-1].type == "revolute" and joint[-1].axis == pytest.approx((0.0, 1.0, 0.0))
-
-
 def test_close_reads_pairs_of_frames_from_a_yaml_file(tmp_path):
     (tmp_path / "loops.yaml").write_text("closed_loop: [[end_a, end_b]]\ntype: [3d]\n")
     closed = [

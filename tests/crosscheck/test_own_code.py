@@ -8,7 +8,6 @@ import pytest
 
 import mbref
 from crosscheck.engine import Setting, engine
-from crosscheck.engines.exudyn.settings_code import Written
 from crosscheck.study.grades import Judged
 from mbref import find_scene
 
@@ -132,15 +131,6 @@ def test_no_code_is_shown_for_families_that_crosscheck_integrates(name):
     integrated = set(found.integrated_here) - solved
     options = {"step": 1e-3, "rtol": 1e-6, "min_step": 1e-5}
     assert integrated and not any(found.own_code(SCENE, Setting(family, options)) for family in integrated)
-
-
-def test_assignments_are_recorded_as_lines_of_code():
-    """``Written`` stands for an object of Exudyn: an assignment to its attribute becomes a line of Python."""
-    statements: list[str] = []
-    settings = Written("settings", statements)
-    settings.newton.relativeTolerance = 1e-6
-    settings.solver = Written("exu", statements).Kind.Dense
-    assert statements == ["settings.newton.relativeTolerance = 1e-06", "settings.solver = exu.Kind.Dense"]
 
 
 def test_fastest_run_within_the_level_is_chosen_otherwise_the_most_accurate():

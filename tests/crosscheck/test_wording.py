@@ -24,11 +24,6 @@ def test_error_is_rounded_up_or_called_less_than_the_bound(value, bound, said):
     assert text.at_most(value, bound) == said
 
 
-def test_first_word_loses_its_capital_except_for_names():
-    assert text.uncapitalised("Both engines") == "both engines"
-    assert text.uncapitalised("MuJoCo is") == "MuJoCo is"
-
-
 def test_times_and_ratios_are_rounded_across_their_units():
     assert [text.seconds(t) for t in (1.0, 0.999, 1e-3, 9.99e-4)] == ["1 s", "999 ms", "1 ms", "999 µs"]
     assert [text.seconds(t) for t in (0.9996, 0.9994, 9.996e-4)] == ["1 s", "999 ms", "1 ms"]

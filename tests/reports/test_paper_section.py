@@ -153,13 +153,6 @@ def test_indexed_records_return_under_their_labels(records, tmp_path):
     assert all(found[label]["outcome"] == records[label]["outcome"] for label in chosen)
 
 
-def test_stored_record_has_a_motion_only_if_a_figure_draws_it(records):
-    """The figure of peaks draws a violation, which is that of the exact motion: rounding."""
-    table, drawn = records[Label("I", "ALF", "θ₂ = π/4")], records[runs.PEAKS]
-    assert Run(table).trajectory.times.size == 0 and not table["violation"]
-    assert len(drawn["violation"]) == len(drawn["times"]) > 1 and max(drawn["violation"]) < 1e-9
-
-
 @pytest.mark.parametrize("power", [1.0, 2.0])
 def test_exponent_of_a_growing_violation_is_the_power_put_in(records, power):
     """A violation of 1e-8 t^p has the exponent p; one that stays at rounding has none (NaN)."""
