@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mbref.equations.joint_reactions import determined_components, open_dimensions, reactions
+from mbref.equations.joint_reactions import determined_components, open_dimensions
 from mbref.equations.model import Model
 from mbref.scene import Scene
 from tests.helpers.parts import X, block, joint
@@ -24,10 +24,3 @@ def test_reactions_are_open_only_at_the_sample_of_the_singular_position():
     assert components["slide"][1].tolist() == [True, False, True, True, True, False]
     assert components["rod"][1].tolist() == [True, False, True, True, True, True]
     assert all(c[[0, 2]].all() for c in components.values())
-
-
-def test_body_without_joints_has_no_reactions():
-    free = Model(Scene(name="s", body=[block("b", (0, 0, 0))]))
-    blocks = free.terms(np.zeros(1), np.array([[[0, 0, 0, 1, 0, 0, 0]]])).blocks
-    assert reactions(free, np.zeros((1, 1, 7)), blocks, np.zeros((1, 0))) == {}
-    assert open_dimensions(free, blocks) == {} == determined_components(free, np.zeros((1, 1, 7)), blocks)

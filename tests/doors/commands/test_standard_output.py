@@ -25,7 +25,9 @@ PRINTING = [
 ]
 
 
-@pytest.mark.parametrize(("program", "words"), PRINTING)
+@pytest.mark.parametrize(
+    ("program", "words"), PRINTING, ids=lambda x: x if isinstance(x, str) else " ".join(x)
+)
 def test_output_to_a_full_disk_ends_with_one_sentence(program, words, capsys):
     with open("/dev/full", "w") as full, redirect_stdout(full):
         assert PROGRAMS[program](words) == 2

@@ -36,7 +36,9 @@ def test_reference_ends_at_the_dead_position_of_a_driven_slider_crank(scene, tim
     assert end_of(scene) == pytest.approx(time, rel=ACCURACY)
 
 
-@pytest.mark.parametrize("made", [lambda: turned(0.5, 0.4, 0.3, 4.0), lambda: pushed(0.2, 0.5, 1.0, 0.7)])
+@pytest.mark.parametrize(
+    "made", [lambda: turned(0.5, 0.4, 0.3, 4.0), lambda: pushed(0.2, 0.5, 1.0, 0.7)], ids=["turned", "pushed"]
+)
 def test_motion_that_ends_before_its_dead_position_has_none(made):
     """It ends at 0.95 of the closed form's time."""
     scene, time = made()

@@ -118,7 +118,8 @@ def test_tilt_of_an_axis_of_at_most_1e_12_rad_is_rounding_and_the_loop_moves(fil
 
 @pytest.mark.parametrize("tilt", [1e-11, 1e-10, 1e-9, 1e-8])
 def test_tilt_of_an_axis_that_may_be_rounding_is_read_alike_in_position_and_in_rows(files, tilt):
-    """Either reading is possible: the loop moves, or it is locked."""
+    """Either reading is possible: the loop moves with one redundant row, or is locked with none.
+    ``freedoms_with_tilt`` asserts that freedoms and redundant rows are equal in number."""
     assert freedoms_with_tilt(files, tilt) in (0, 1)
 
 

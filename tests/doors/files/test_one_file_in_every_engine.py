@@ -196,29 +196,31 @@ def test_motion_on_the_closure_is_mbrefs_and_mujocos(what: str, tmp_path: Path):
         )
 
 
+def first_row(rows: Any) -> Any:
+    return replace(rows, matrix=tuple(np.array(rows.matrix)[[0]].tolist()))
+
+
+def one_row_more(rows: Any) -> Any:
+    return replace(rows, matrix=(*rows.matrix, (1.0, 0.0, 0.0)))
+
+
 @pytest.mark.parametrize(
-    "change, named_so",
+    ("arm", "change", "name", "field"),
     [
-        ({"body": "other"}, ("close", "Jacobian")),
-        ({"rows": 2}, ("close", "Jacobian")),
-        ({"more": True}, ("loops and couplings", "rank of the rows")),
+        ("upper", lambda rows: rows, "close", "Jacobian"),
+        ("lower", first_row, "close", "Jacobian"),
+        ("lower", one_row_more, "loops and couplings", "rank of the rows"),
     ],
+    ids=["another arm", "one row instead of two", "one row more"],
 )
-def test_rows_that_do_not_hold_the_loop_are_named(change, named_so, tmp_path):
-    """Rows of the loop's point on the other arm, one row fewer, and a row more; ``named_so`` has name and
-    field of the difference."""
+def test_rows_that_do_not_hold_the_loop_are_named(arm, change, name, field, tmp_path):
+    """In the file the loop "close" holds a point of the lower arm to the other one by two rows."""
     file = file_of(written(tmp_path, one_equality("connect")))
     match, size = matched(file.machine, file.machine, DOUBLE), size_of(file.machine)
-    loops = file.machine.loops or ()
-    if "body" in change:  # the anchor is on the other arm, where it is not fixed to the arm of the file
-        loops = tuple(replace(loop, bodies=("upper", loop.bodies[1])) for loop in loops)
-    rows = [rows_of(replace(file.machine, loops=loops), pose, size) for pose in file.asked.closed]
-    if "rows" in change:
-        rows = [replace(row, matrix=tuple(np.array(row.matrix)[[0]].tolist())) for row in rows]
-    if "more" in change:
-        rows = [replace(row, matrix=(*row.matrix, (1.0, 0.0, 0.0))) for row in rows]
+    loops = tuple(replace(loop, bodies=(arm, loop.bodies[1])) for loop in file.machine.loops or ())
+    rows = [change(rows_of(replace(file.machine, loops=loops), pose, size)) for pose in file.asked.closed]
     found = of_rows(match, rows, file.asked.closed, DOUBLE)
-    assert named_so in [(d.name, d.field) for d in found]
+    assert (name, field) in [(d.name, d.field) for d in found]
 
 
 def test_verdict_names_what_is_dropped_and_whether_the_reader_says_so(tmp_path: Path, capsys: Any):

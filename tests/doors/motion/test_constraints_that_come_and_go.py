@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import mbref
+from crosscheck.judge.arithmetic import EXTENDED, doubles
+from crosscheck.judge.reference.piecewise import motion_by
+from crosscheck.judge.reference.taylor import natural_motion
 from mbref import Motion, Scene, SceneError
 from mbref.cli import main
 from tests.helpers.intermittent_mechanisms import carts, intermittent_mechanism
@@ -102,47 +105,54 @@ def motion() -> Motion:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_every_method_follows_the_motion_through_its_events(motion, method):
-    """At 1e-9 for a step; up to redundant joints where the formulation needs independent rows."""
+def test_every_method_follows_the_motion_through_its_events_as_the_judges_reference(motion, method):
+    """Positions (m) agree to a tenth of the default tolerance, 1e-9."""
     found = mbref.simulate(motion.mechanism, method, times=motion.times)
-    k = len(found.times)
-    assert k == len(motion.times) or (k and method.startswith("lm"))
-    assert np.abs(found.position - motion.position[:k]).max() < 1e-6
+    assert found.outcome.name == "COMPLETED", found.message
+    exact = motion_by(natural_motion, motion.mechanism, motion.times, EXTENDED)
+    assert np.abs(found.position - doubles(exact.position)).max() < 1e-10
 
 
-def test_motion_from_a_sample_on_is_the_motion_itself_and_files_have_it_whole(motion, tmp_path):
-    for t in (0.1, 0.2):
-        rest = mbref.simulate(motion.scene_at(t), times=[0.0, 0.3 - t])
-        assert np.abs(rest.position[-1] - motion.position[-1]).max() < 1e-9
+@pytest.mark.parametrize("t", [0.1, 0.2])
+def test_scene_at_a_sample_between_events_continues_the_motion(motion, t):
+    """A run from the sample on ends where the whole motion ends, to the tolerance of both (m)."""
+    rest = mbref.simulate(motion.scene_at(t), times=[0.0, 0.3 - t])
+    assert np.abs(rest.position[-1] - motion.position[-1]).max() < 1e-9
+
+
+def test_saved_motion_with_events_has_its_mechanism_and_columns(motion, tmp_path):
+    """Columns are computed anew from the states in the file, to rounding."""
     motion.save(tmp_path / "motion.json")
     loaded = Motion.load(tmp_path / "motion.json")
     columns, others = motion.columns(), loaded.columns()
     assert loaded.mechanism == motion.mechanism and list(columns) == list(others)
     assert all(np.allclose(columns[name], others[name], rtol=0, atol=1e-9) for name in columns)
-    estimated = mbref.with_error_estimate(motion)
-    assert 0.0 < np.max(estimated.error_estimate.error) < 1e-7
 
 
-def test_given_pose_is_met_or_refused_with_the_gap(tmp_path, capsys):
-    """A rod that turns at 5 rad/s is back after 2π / 5 s."""
+def rod_and_lock(begin: float) -> Scene:
+    """A rod that turns at 5 rad/s, and a weld that holds it in its first pose from a time (s) on."""
     turning = {**rod("rod", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 2.0), "angular_velocity": [0.0, 0.0, 5.0]}
     pivot = hinge("A", "ground", "rod", (0.0, 0.0, 0.0))
+    lock = joint("L", "fixed", "ground", "rod", active=[[begin, 3.0]], engages="given_pose")
+    return Scene(name="lock", duration=2.0, body=[turning], joint=[pivot, lock])
 
-    def scene(begin: float) -> Scene:
-        lock = joint("L", "fixed", "ground", "rod", active=[[begin, 3.0]], engages="given_pose")
-        return Scene(name="lock", duration=2.0, body=[turning], joint=[pivot, lock])
 
-    (event,) = mbref.simulate(scene(2 * np.pi / 5)).events
+def test_weld_that_engages_at_its_given_pose_stops_a_rod_that_is_back_there():
+    """The rod is back after 2π / 5 s and loses its energy ½ m l² / 3 · ω² = 25/3 J."""
+    (event,) = mbref.simulate(rod_and_lock(2 * np.pi / 5)).events
     assert event.energy_after <= ROUNDING and event.energy_before == pytest.approx(25 / 3, rel=ROUNDING)
-    scene(1.0).save(tmp_path / "lock.toml")
+
+
+def test_weld_that_cannot_engage_at_its_given_pose_is_refused_with_the_gap(tmp_path, capsys):
+    """After 1 s the rod has turned by 5 rad: its axis is off by |sin 5| = 0.959 across the given one."""
+    rod_and_lock(1.0).save(tmp_path / "lock.toml")
     assert main(["run", str(tmp_path / "lock.toml")]) == 2
-    assert (
-        "L.active: cannot begin to hold at t = 1 s: the given pose is missed by 0.959"
-        in capsys.readouterr().err
-    )
+    said = "L.active: cannot begin to hold at t = 1 s: the given pose is missed by 0.959"
+    assert said in capsys.readouterr().err
 
 
 def test_command_prints_events_and_records_them(tmp_path, capsys):
+    """The carts have ½ (1 · 2² + 3 · 1²) = 3.5 J until they latch at 0.1 s; they let go at 0.3 s."""
     carts().save(tmp_path / "carts.toml")
     assert main(["run", str(tmp_path / "carts.toml")]) == 0
     assert "event at t = 0.1 s: L begins to hold; kinetic energy 3.5 J" in capsys.readouterr().out
@@ -167,25 +177,27 @@ def test_faults_of_intervals_name_the_field(changes, said):
     assert said in str(fault.value)
 
 
-def test_parts_of_a_joint_with_intervals_and_other_commands_are_refused_by_name(tmp_path, capsys):
-    """A driver of such a joint, commands that are of one pose, and a joint that begins to hold against a
-    driver."""
-    with pytest.raises(
-        SceneError, match=r"driver\[A\].joint: needs a joint that always holds; 'A' has intervals"
-    ):
-        pendulum(1.0, driver=[{"joint": "A", "polynomial": [0.0, 1.0]}])
+TURNED = [{"joint": "A", "polynomial": [0.0, 1.0]}]  # a driver of the pivot
+
+
+def test_driver_of_a_joint_with_intervals_is_refused_by_name():
+    says = r"driver\[A\].joint: needs a joint that always holds; 'A' has intervals"
+    with pytest.raises(SceneError, match=says):
+        pendulum(1.0, driver=TURNED)
+
+
+@pytest.mark.parametrize("command", ["diagnose", "equilibrium", "modes"])
+def test_command_of_one_pose_refuses_a_scene_with_intervals_by_the_joint(command, tmp_path, capsys):
     carts().save(tmp_path / "carts.toml")
-    for command in ("diagnose", "equilibrium", "modes"):
-        assert main([command, str(tmp_path / "carts.toml")]) == 2
-        assert "joint[L].active: only motions have intervals" in capsys.readouterr().err
-    driven = pendulum(
-        0.1,
-        joint=[
-            hinge("A", "ground", "rod", (0, 0, 0)),
-            joint("L", "fixed", "ground", "rod", active=[[0.1, 2.0]]),
-        ],
-    )
-    with pytest.raises(
-        SceneError, match=r"L\.active: cannot begin to hold at t = 0\.1 s: the drivers contradict"
-    ):
-        mbref.simulate(driven.with_(driver=[{"joint": "A", "polynomial": [0.0, 1.0]}]))
+    assert main([command, str(tmp_path / "carts.toml")]) == 2
+    assert "joint[L].active: only motions have intervals" in capsys.readouterr().err
+
+
+def test_weld_that_would_begin_to_hold_a_driven_rod_is_refused_by_name():
+    """From 0.1 s on the weld holds the rod, which the driver turns on."""
+    pivot = hinge("A", "ground", "rod", (0, 0, 0))
+    weld = joint("L", "fixed", "ground", "rod", active=[[0.1, 2.0]])
+    driven = pendulum(0.1, joint=[pivot, weld], driver=TURNED)
+    says = r"L\.active: cannot begin to hold at t = 0\.1 s: the drivers contradict"
+    with pytest.raises(SceneError, match=says):
+        mbref.simulate(driven)

@@ -157,8 +157,8 @@ def test_formulation_without_the_claim_reports_a_singular_matrix_and_the_body_wi
 
 
 def test_sweep_has_a_motion_for_each_pair_of_gains_and_feedback_lessens_the_violation():
-    """Without feedback the error of the constraints grows in proportion to time; with gains of 50 /s and
-    (50 /s)² it decays within 0.02 s and stays small."""
+    """Feedback with gains of 50 /s and (50 /s)² forgets violations after 0.02 s; without it they add up. At
+    0.05 s the violation with feedback is less than a fifth."""
     gains = {"alpha": [0, 50], "beta": [0, 50]}
     runs = mbref.sweep("planar_slider_crank", "mpi-svd+baumgarte/rk4[step=1e-3]", gains, [0.05])
     violation = {label: motion.violation.position[-1] for label, motion in runs.items()}

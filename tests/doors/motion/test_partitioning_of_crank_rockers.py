@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import mbref
+from crosscheck.judge.truth import closed_form, truth_for
 from mbref.scene import Scene
 from tests.helpers.parts import hinge
 from tests.helpers.spinning import spinning_mechanism
@@ -95,19 +96,19 @@ def test_partitioning_keeps_the_branch_and_the_energy_of_a_crank_rocker(lengths,
     assert deviation(lengths, part * math.pi, step) < limit
 
 
-def test_loose_tolerance_bounds_errors_of_velocities_of_a_four_bar():
-    """Velocities at rtol 1e-3 agree with the default method to 1e-2 of the largest."""
-    times = np.linspace(0.25, 1.0, 4)
-    exact = mbref.simulate("four_bar_gravity", times=times)
-    found = mbref.simulate("four_bar_gravity", "alf-dual+partitioning", times, mbref.Limits(rtol=1e-3))
-    assert np.abs(found.velocity - exact.velocity).max() < 1e-2 * np.abs(exact.velocity).max()
+def test_velocities_of_a_four_bar_at_a_loose_tolerance_meet_the_closed_form():
+    """The links of a parallelogram have one rate, by the energy. With rtol 1e-3 errors are below 1e-3 of the
+    largest velocity."""
+    scene, times = mbref.find_scene("four_bar_gravity"), np.linspace(0.25, 1.0, 4)
+    exact = closed_form(scene).poses(times).velocity
+    found = mbref.simulate(scene, "alf-dual+partitioning", times, mbref.Limits(rtol=1e-3))
+    assert np.abs(found.velocity - exact).max() < 1e-3 * np.abs(exact).max()
 
 
-@pytest.mark.parametrize("seed", [71, 78])
-def test_partitioning_and_the_series_agree_on_random_mechanisms(seed):
-    """Bodies are within 1 µm at 1 s: errors of order 4 of 0.5 ms steps are 0.1 µm, and `taylor`'s less."""
+@pytest.mark.parametrize("seed", [71, pytest.param(78, marks=pytest.mark.slow)])
+def test_partitioning_moves_random_mechanisms_as_the_judges_reference(seed):
+    """Bodies are within 1 µm at 1 s: errors of order 4 of 0.5 ms steps are 0.1 µm."""
     scene = spinning_mechanism(seed)
-    exact = mbref.simulate(scene, "taylor", [1.0])
     found = mbref.simulate(scene, "mpi-svd+partitioning/rk4[step=5e-4]", [1.0])
     assert found.outcome is mbref.Outcome.COMPLETED, found.message
-    assert np.abs(found.position - exact.position).max() < 1e-6
+    assert np.abs(found.position - truth_for(scene).poses([1.0]).position).max() < 1e-6

@@ -115,22 +115,14 @@ def test_links_of_a_strandbeest_have_jansens_holy_numbers():
     scene = find_scene("strandbeest[3]")
     at = {joint.name: np.array(joint.anchor)[:2] * 100 for joint in scene.joint}
     mass = {body.name: body.mass * 100 for body in scene.body}
-    holy = {"j": 50.0, "k": 61.9, "c": 39.3, "f": 39.4, "b": 41.5, "e": 55.8, "d": 40.1, "g": 36.7, "m": 15.0}
-    pairs = {
-        "j": "PT",
-        "k": "RU",
-        "c": "SU",
-        "f": "WX",
-        "b": "QT",
-        "e": "TW",
-        "d": "QW",
-        "g": "VX",
-        "m": "OP",
+    holy = {  # link: its hinges, and their distance in cm
+        **{"j": ("PT", 50.0), "k": ("RU", 61.9), "c": ("SU", 39.3), "f": ("WX", 39.4), "b": ("QT", 41.5)},
+        **{"e": ("TW", 55.8), "d": ("QW", 40.1), "g": ("VX", 36.7), "m": ("OP", 15.0)},
     }
     for leg in "012":
-        for link, (first, second) in pairs.items():
+        for link, ((first, second), length) in holy.items():
             ends = at[first if first == "O" else first + leg], at[second + leg]
-            assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(holy[link]), link
+            assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(length), link
         assert at["Q" + leg] - at["O"] == pytest.approx([-38.0, -7.8])
         masses = {"bde": 41.5 + 40.1 + 55.8, "ghi": 36.7 + 65.7 + 49.0, "k": 61.9}
         assert {link: mass[link + leg] for link in masses} == pytest.approx(masses)

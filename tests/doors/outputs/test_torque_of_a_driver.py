@@ -56,14 +56,13 @@ def test_motor_accelerates_its_wheel_and_its_armature(bodies, axis, method):
     assert found.force is None
 
 
-@pytest.mark.parametrize("kind", ["first", "second"])
-def test_motor_drives_the_wheel_that_meshes_with_its_own(kind):
-    """The reduced inertia is J + I + n² (J' + I') with n turns of the second wheel per turn of the first."""
-    turns = -3.0
-    pair, ratio = (["A", "B"], turns) if kind == "first" else (["B", "A"], 1 / turns)
-    mesh = [{"name": "mesh", "joints": pair, "ratio": ratio}]
+@pytest.mark.parametrize(("pair", "ratio"), [("AB", -3.0), ("BA", -1 / 3)])
+def test_motor_of_a_wheel_drives_the_wheel_that_meshes_with_it(pair, ratio):
+    """The reduced inertia of A is J + I + n² (J' + I'), as B turns by n = -3 turns in a turn of A. The
+    coupling lists A or B first."""
+    mesh = [{"name": "mesh", "joints": [*pair], "ratio": ratio}]
     found = moved(*wheels(0.4, 0.7), coupling=mesh).driver("A")
-    assert relative_error(found.torque, (0.1 + 0.4 + turns**2 * (0.2 + 0.7)) * SECOND) <= CLOSE
+    assert relative_error(found.torque, (0.1 + 0.4 + 3.0**2 * (0.2 + 0.7)) * SECOND) <= CLOSE
 
 
 def test_motor_drives_all_wheels_of_a_train():

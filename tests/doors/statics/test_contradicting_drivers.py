@@ -51,6 +51,7 @@ SEEN_NOWHERE = {"amplitude": 1e-7, "frequency": 200 * np.pi, "phase": np.pi / 2}
         {"polynomial": [-1e-7, 0.4], "sine": SEEN_NOWHERE},
         {"table": [*ROWS[:50], (0.5, 0.2 + 1e-7), *ROWS[51:]]},
     ],
+    ids=["only in rate", "by a sine that is zero at even times", "at one row of a table"],
 )
 def test_drivers_that_differ_only_in_rate_or_between_even_times_are_named(other):
     """The first driver moves the slide by 0.4 t m."""
@@ -110,7 +111,11 @@ def test_drivers_of_two_coupled_wheels_agree_over_many_turns_or_are_named():
         simulate(scene.with_(driver=[drivers[0], other]), times=[1.0])
 
 
-@pytest.mark.parametrize("made", [lambda: turned(0.5, 0.4, 0.3, 4.0), lambda: pushed(0.2, 0.5, 1.0, 0.7)])
+@pytest.mark.parametrize(
+    "made",
+    [lambda: turned(0.5, 0.4, 0.3, 4.0), lambda: pushed(0.2, 0.5, 1.0, 0.7)],
+    ids=["driven crank", "driven slider"],
+)
 def test_single_driver_at_a_dead_position_is_no_contradiction_of_drivers(made):
     """The run ends at the time of the closed form, which its message names."""
     scene, dead = made()
