@@ -92,7 +92,7 @@ def test_check_repeated_fails_only_engines_whose_runs_depend_on_earlier_runs(fak
     assert reordered.status == "pass", reordered
 
 
-def test_a_seed_shakes_a_scene_and_its_motion_by_rounding():
+def test_shaking_a_scene_by_roundings_moves_its_motion_by_roundings():
     """One seed gives one scene; motions differ by less than 1e-12 of the scene's length."""
     for name in ("spatial_slider_crank", "four_bar_gravity"):
         scene, times = SPECIMENS[name].scene, np.linspace(0, SPECIMENS[name].scene.duration, 5)

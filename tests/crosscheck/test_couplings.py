@@ -48,7 +48,7 @@ def test_mbref_moves_coupled_joints_as_the_reference(make):
     assert balance(scene, motion, motion) <= 1e-12 and idle(scene, motion, motion) <= 1e-12
 
 
-def test_violation_of_a_coupling_is_its_slip_over_the_scene_with_another_ratio():
+def test_run_with_another_gear_ratio_violates_the_coupling_by_its_slip():
     """A gear that turns by -0.51 q₁ instead of -0.5 q₁ violates q₂ + 0.5 q₁ = 0 by 0.01 q₁, and the rates by
     0.01 q₁'. From rest under a constant torque, q₁' = 2 q₁ / t at t = 1 s."""
     scene = gear_pair()

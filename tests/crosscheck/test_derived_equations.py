@@ -44,7 +44,7 @@ def test_symbolic_equations_of_a_crane_give_its_accelerations(moment: float) -> 
     assert found.astype(float) == pytest.approx(expected(0.3, 1.2, moment))
 
 
-def test_coordinates_of_a_mechanism_without_loops_are_settled_already() -> None:
+def test_closing_no_loops_leaves_the_coordinates_of_a_mechanism_unchanged() -> None:
     """``settled`` closes loops; the crane has no rows of loops, and keeps its two coordinates and rates."""
     equations = TreeEquations(crane())
     assert equations.n == 2 and equations.rows == []

@@ -114,7 +114,7 @@ def test_a_faulty_scene_of_a_folder_of_records_is_refused(tmp_path):
         load(place)
 
 
-def test_runs_of_different_mechanisms_are_each_in_one_set_only():
+def test_runs_of_different_mechanisms_are_listed_without_comparison():
     """Records name their mechanism; one without a name is compared."""
     old, new = one(1e-5), one(1e-4)
     old["run"]["mechanism"], new["run"]["mechanism"] = "m1", "m2"
@@ -147,7 +147,7 @@ def circumstance(engine: str, version: str, cpu: str, **more: Any) -> dict[str, 
     return {"scene": "s", **made, **more}
 
 
-def test_circumstances_name_changed_versions_machines_and_mechanisms():
+def test_comparison_of_records_names_changed_versions_machines_and_mechanisms():
     """``circumstance`` has engine, version and machine of a run by its key."""
     old = {
         "1": circumstance("a", "1.0", "x", commit="c1"),

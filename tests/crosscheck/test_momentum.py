@@ -53,8 +53,8 @@ def test_momentum_drift_of_turning_in_place_is_relative_to_the_spin():
 
 
 def test_impulses_of_gravity_forces_and_moments_are_no_drift():
-    """Gravity of 1 m/s² gives each body a velocity t, which is a drift if the scene has no gravity; 5 N m
-    give body b a spin t; 6 N give body a a velocity of 3 t."""
+    """Gravity of 1 m/s² gives each body a velocity t, which is a drift over 0.1 if the scene has no gravity;
+    5 N m give body b a spin t; 6 N give body a a velocity of 3 t."""
     run = motion()
     fall = np.zeros((3, 2, 3))
     fall[:, :, 2] = -TIMES[:, None]

@@ -78,7 +78,7 @@ def error(name: str, mechanism: Scene) -> float:
 
 @pytest.mark.parametrize("name", ENGINES)
 @pytest.mark.parametrize("pair", PAIRS)
-def test_both_loads_of_a_pair_act(name, pair):
+def test_engine_moves_a_mechanism_by_both_of_two_loads_at_one_place(name, pair):
     """By the motion of Gauss's principle with both loads, the error is below LIKE_TRUTH; with one load alone
     the principle's motion is off by over 100 times as much. Engines that refuse the pair are skipped."""
     assert error(name, scene(load=PAIRS[pair])) < LIKE_TRUTH < least_effect(pair) / 100

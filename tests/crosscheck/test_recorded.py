@@ -107,7 +107,7 @@ def test_planted_difference_is_the_first_explanation(name, table):
 
 
 @pytest.mark.slow
-def test_motion_of_a_weightless_body_is_wrong_and_has_no_explanation():
+def test_motion_with_a_hundred_thousandth_of_a_mass_is_wrong_without_an_explanation():
     """The recorded motion has a body of 1e-5 of its mass, to which no searched change leads."""
     found = judge_motion(SPRUNG, of_other(SPRUNG, body=lighter("lower", 1e-5)))
     assert not found.is_right and not found.explanations

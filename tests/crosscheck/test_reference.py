@@ -131,7 +131,7 @@ def test_panels_of_a_stiff_governor_are_as_long_as_its_smooth_motion_allows():
     assert differences(scene, natural_motion(scene, times, EXTENDED, seconds=SECONDS), motion).max() < AGREE
 
 
-def test_seed_of_the_rows_moves_contradicting_joints_by_rounding_only():
+def test_choice_of_rows_moves_contradicting_joints_by_rounding_only():
     """Bennett's linkage with rounded axes, in formulation B: another seed selects other rows and displaces
     joints by 2e-16, and the motion differs by at most 1e-14; an equal seed gives it to the last bit."""
     scene = Isometry(ASKEW, np.array([0.3, -0.5, 0.2])).change(SCENES["bennett"]())

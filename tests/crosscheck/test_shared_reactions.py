@@ -49,7 +49,7 @@ def test_reactions_that_hinges_share_are_listed_by_joint_and_run():
     assert found["A"] == pytest.approx({"one": 3.0, "other": 1.0})
 
 
-def test_another_share_is_no_difference_of_unique_reactions():
+def test_hinges_that_share_a_force_otherwise_have_equal_unique_reactions():
     """Shares of A differ by 2 N of the largest force, 7 N; C's reaction and the resultants are equal."""
     compared = joint_reactions.compare(DOOR, ONE, OTHER)
     assert compared.joints["C"].shared == 0 and compared.joints["C"].unique == 0.0

@@ -86,8 +86,8 @@ def test_failed_correction_of_a_state_ends_the_run_with_its_reason() -> None:
     assert failure.value.outcome is Outcome.NOT_CONVERGED
 
 
-def test_noisy_step_a_little_longer_than_the_shortest_ends() -> None:
-    """The interval is 1.005 shortest steps and every slope is noise: the step must not be tried for ever."""
+def test_noise_over_an_interval_near_the_shortest_step_is_stepped_over() -> None:
+    """The interval is 1.005 shortest steps and every slope is noise; 1000 evaluations suffice for it."""
     shortest, calls = 1e-3, 0
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
@@ -114,7 +114,8 @@ def test_motion_that_is_not_finite_after_half_a_second_fails_there() -> None:
 
 
 def test_rk4_has_fourth_order_and_divides_the_interval_evenly() -> None:
-    """On x = cos 5 t over 1 s, whose length is no multiple of the steps of 11 and 5.5 ms."""
+    """On x = cos 5 t over 1 s, whose length is no multiple of the steps of 11 and 5.5 ms. Errors of the next
+    order leave the measured order within 0.2 of 4."""
     steps, errors = (0.011, 0.0055), []
     for h in steps:
         counts = Counts()

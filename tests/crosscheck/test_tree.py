@@ -53,7 +53,7 @@ def ring(**changes) -> Scene:
     return linkage("ring", places).with_(**changes)
 
 
-def test_spring_of_a_joint_outside_the_tree_has_its_angle():
+def test_spring_acts_in_a_joint_outside_the_tree():
     """Springs act in all four joints of a ring, of which one is outside the tree. Formulation A has no tree:
     both motions are equal to rounding, and move a body by over 1 mm."""
     springs = [

@@ -196,7 +196,7 @@ def test_table_of_cranks_shows_that_an_exact_record_never_leaves_the_true_motion
     assert all(row["Crank, rad/s"] == row["True"] for row in cells(found))
 
 
-def test_digits_of_exact_accelerations_are_all_and_of_a_run_that_failed_at_its_start_unknown(records):
+def test_accelerations_of_exact_records_have_all_digits_and_a_failed_start_has_none(records):
     """Errors of records of exact motions are below 50 roundings; without a sample they are NaN."""
     for name, errors in paper_methods.digit_errors(records).items():
         assert max(errors) < 1e-14, (name, errors)

@@ -257,7 +257,7 @@ def test_provenance_lists_versions_machine_settings_and_seed():
     assert text.startswith("12 records; seed 0. ") and "the least of 1 runs" in text, text
 
 
-def test_runs_over_a_hundred_tolerances_are_counted():
+def test_runs_with_errors_above_a_hundred_tolerances_are_counted():
     """rtol 1e-6: 0.9e-4 is within, 1.1e-4 over. A failed run and one without rtol do not count."""
     asked = [record("a", "b", error, 1.0, rtol=1e-6) for error in (0.9e-4, 1.1e-4)]
     failed = record("a", "b", 1e-3, 1.0, rtol=1e-6, outcome=Outcome.NOT_CONVERGED)
