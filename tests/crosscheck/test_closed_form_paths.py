@@ -71,6 +71,7 @@ def test_a_pendulum_with_a_part_outside_its_closed_form_has_none(parts):
 
 
 def test_a_parallelogram_without_masses_has_a_closed_form_only_if_it_is_driven():
+    """Bodies without masses have no accelerations of their own."""
     driver = Driver(joint="A", polynomial=(0.0, 1.0))
     plain = tuple(Body(name=b.name, position=b.position) for b in BOX.body)
     assert closed_form(BOX.with_(body=plain)) is None

@@ -151,7 +151,8 @@ def test_tables_of_verdicts_end_with_the_failures_and_a_summary():
 
 
 def test_coordinate_partitioning_passes_the_check_in_millimetres():
-    """Rounding of lengths is 1000 times as large in millimetres; Newton's method has to end above it."""
+    """The check compares the motion of a scene whose lengths are in millimetres. Their rounding is 1000 times
+    as large, and Newton's method of the partitioning has to end above it."""
     specimen, family = SPECIMENS["drawn loop"], "mpi-svd+partitioning"
     bench = trial.set_up(InProcess(engine("mbref")), specimen, family)
     verdict = suite.verdict_on("in millimetres", bench)

@@ -173,7 +173,7 @@ def test_energy_error_is_none_for_a_mechanism_at_rest():
     assert energy_series(scene, replace(rest, velocity=noise + 1.0)) == pytest.approx(np.ones(5))
 
 
-def test_error_of_a_run_beyond_the_truth_is_measured_to_its_end():
+def test_error_of_a_run_that_outlasts_the_truth_is_measured_to_the_end_of_the_truth():
     """Positions are off by a vector of 13 mm: at sample 15, behind the truth's end at 0.1 s (sample 10), it
     is no error, and at sample 7 it is. Violations need no truth: they are measured over the whole run."""
 

@@ -86,7 +86,8 @@ def test_scene_without_a_momentum_balance_has_no_drift(change):
 
 
 def test_run_at_rest_has_no_momentum_drift():
-    """No momentum of the motion could be the scale: None stands for no drift."""
+    """No momentum of the motion could be the scale: None stands for no drift. Moving bodies have one."""
+    assert momentum_series(SCENE, motion()) is not None
     run = motion()
     run.velocity[:], run.angular_velocity[:] = 0.0, 0.0
     assert momentum_series(SCENE, run) is None

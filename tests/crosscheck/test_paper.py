@@ -80,7 +80,7 @@ def test_all_cells_of_the_paper_have_equal_settings_and_no_masses():
         assert all(body.mass is None for body in case.scene.body), label
 
 
-def test_every_variant_of_the_settings_changes_one_of_them():
+def test_every_variant_of_the_paper_s_settings_differs_in_one_setting():
     """One option of the run, of ALF, or the size, seed or integrator differs from the base's. The forced step
     follows the smallest step."""
     default = {f.name for f in dataclasses.fields(Limits)}

@@ -19,7 +19,7 @@ LOST = 1e-11  # m: singular positions magnify rounding
 
 @pytest.mark.parametrize("name", ["four_bar", "four_bar_quarter", "four_bar_gravity"])
 def test_tree_formulation_crosses_singular_positions_on_the_smooth_branch(name):
-    """The truth is the closed form, to LOST; at least three singular positions are crossed."""
+    """The truth is the closed form, to LOST; at least three steps cross a singular position."""
     scene = SCENES[name]()
     times = np.linspace(0.0, scene.duration, 6)
     motion, exact = tree_motion(scene, times, EXTENDED, seconds=SECONDS), closed_form(scene).poses(times)

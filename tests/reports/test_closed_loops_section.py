@@ -30,7 +30,7 @@ def maps(section: list) -> tuple[HeatMap, HeatMap]:
 
 
 def test_best_cells_show_error_refusal_and_early_end(section):
-    """✓ right, ≈ inaccurate, – refused, ! ended early, ○ not run; with the cell's style on the page."""
+    """✓ right and ≈ inaccurate have the style "kept"; – refused, ! ended early, ○ not run."""
     best, _ = maps(section)
     first = {name: (row[0].text, row[0].kind) for name, row in best.rows.items()}
     assert first == {
@@ -45,7 +45,8 @@ def test_best_cells_show_error_refusal_and_early_end(section):
 
 
 def test_default_rows_are_the_engines_with_a_run_of_defaults(section):
-    """mbref has no defaults, and Pinocchio refuses one scene and has a tuned run of another."""
+    """mbref has no defaults, and Pinocchio refuses one scene and has a tuned run of another. The style of a
+    wrong run is "false"."""
     _, defaults = maps(section)
     assert {name: row[0].text for name, row in defaults.rows.items()} == {
         "mujoco": "✗ 0.5",

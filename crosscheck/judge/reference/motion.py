@@ -33,7 +33,8 @@ class Motion:
     (w, x, y, z) body to world of either sign, with ``velocity``, ``angular_velocity``, ``acceleration`` and
     ``angular_acceleration`` (k, nb, 3); elements belong to the arithmetic. ``reached`` (s) is the last
     requested time, or the time of an early end, with the ``reason`` as a clause ("" if complete).
-    ``crossings`` (s) are the times of singular positions that were passed, ``seconds`` is CPU time.
+    ``crossings`` (s) are times of singular positions that were passed, at most one a step, and ``seconds`` is
+    CPU time.
     ``contradiction`` is the largest residual of redundant rows, relative to the largest coordinate, if it was
     computed. ``formulation`` is A or B.
     """
