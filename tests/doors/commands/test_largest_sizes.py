@@ -1,5 +1,8 @@
 """Sizes of scenes and runs that no machine has are refused before anything is built."""
 
+import signal
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
@@ -8,6 +11,7 @@ from mbref import find_scene, simulate
 from mbref.cli import main
 from mbref.equations.model import Model
 from mbref.input_error import InputError
+from mbref.kernels.compilation import CACHE
 from mbref.linear_algebra.symbolic_factorisation import symbolic_factorisation
 from mbref.scene import Body, Revolute, Scene
 
@@ -31,6 +35,21 @@ COMMANDS = [
 ]
 
 
+@pytest.fixture
+def ten_seconds() -> Iterator[None]:
+    """Let the test fail after 10 CPU s: a scene that is not refused would be built for hours."""
+
+    def end(*_: object) -> None:
+        raise AssertionError("not refused within 10 CPU s")
+
+    before = signal.signal(signal.SIGPROF, end)
+    signal.setitimer(signal.ITIMER_PROF, 10.0)
+    yield
+    signal.setitimer(signal.ITIMER_PROF, 0.0)
+    signal.signal(signal.SIGPROF, before)
+
+
+@pytest.mark.usefixtures("ten_seconds")
 @pytest.mark.parametrize(("program", "words"), COMMANDS, ids=lambda x: x[0] if isinstance(x, list) else "")
 @pytest.mark.parametrize("chain", ["four_bar_chain", "slider_crank_chain"])
 def test_chain_of_too_many_loops_is_refused_and_nothing_is_written(
@@ -88,6 +107,14 @@ def test_factorisation_of_500_rows_on_one_coordinate_is_refused_before_its_updat
     row, column = np.arange(500), np.zeros(500, dtype=int)
     with pytest.raises(InputError, match=r"500 constraint rows share bodies.* has 20833250 updates"):
         symbolic_factorisation(row, column, row, np.ones(1, dtype=bool))
+
+
+def test_factorisation_of_300_rows_on_one_coordinate_leaves_no_file_above_32_mb_in_the_cache():
+    """Its list of updates, 2 · 4 bytes for each of n³ / 6, has 36 MB."""
+    row, column = np.arange(300), np.zeros(300, dtype=int)
+    made = symbolic_factorisation(row, column, row, np.ones(1, dtype=bool))
+    assert 4 * sum(array.size for array in made) > 36e6
+    assert all(path.stat().st_size < 34e6 for path in CACHE.glob("patterns/*"))
 
 
 @pytest.mark.slow

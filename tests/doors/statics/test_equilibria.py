@@ -47,6 +47,18 @@ def test_flat_parallelogram_is_an_equilibrium_at_a_singular_position_and_has_no_
     assert "at a singular position" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("tilt", "found"), [(1e-6, []), (0.0, ["indifferent"])])  # rad
+def test_block_on_a_slide_rests_everywhere_if_it_is_level_and_nowhere_if_tilted(tilt, found):
+    """Along the slide the acceleration is G sin(tilt), here a millionth of the weight's, and nothing holds."""
+    block = Scene(
+        name="block",
+        gravity=(G * np.sin(tilt), -G * np.cos(tilt), 0.0),
+        body=[rod("block", (0.5, 0.0, 0.0))],
+        joint=[slide("S", "block", ORIGIN, (1.0, 0.0, 0.0))],
+    )
+    assert [each.stability for each in equilibria(block, starts=2)] == found
+
+
 @pytest.mark.parametrize("natural", [0.0, np.pi])
 def test_inverted_pendulum_that_its_spring_just_holds_is_one_indifferent_equilibrium(natural):
     """k = m g l: the stiffness vanishes at the upright pose, the only equilibrium, where the search begins
