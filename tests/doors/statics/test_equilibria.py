@@ -48,8 +48,8 @@ def test_flat_parallelogram_is_an_equilibrium_at_a_singular_position_and_has_no_
 
 
 @pytest.mark.parametrize(("tilt", "found"), [(1e-6, []), (0.0, ["indifferent"])])  # rad
-def test_block_on_a_slide_rests_everywhere_if_it_is_level_and_nowhere_if_tilted(tilt, found):
-    """Along the slide the acceleration is G sin(tilt), here a millionth of the weight's, and nothing holds."""
+def test_block_on_a_level_slide_rests_everywhere_and_on_a_tilted_one_nowhere(tilt, found):
+    """Along the slide the acceleration is G sin(tilt), a millionth of the weight's, and nothing holds it."""
     block = Scene(
         name="block",
         gravity=(G * np.sin(tilt), -G * np.cos(tilt), 0.0),

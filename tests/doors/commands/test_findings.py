@@ -1,7 +1,10 @@
 """Findings in other libraries: their page, their proofs, and their status at the installed version."""
 
+import lzma
 import math
 import re
+import zipfile
+from pathlib import Path
 
 import pytest
 
@@ -9,8 +12,12 @@ from crosscheck.cli.commands import main
 from crosscheck.cli.findings import chosen
 from crosscheck.cli.request import RequestError
 from crosscheck.files.corpus import CASES
+from crosscheck.files.public import FILE as PUBLIC
 from crosscheck.findings.finding import FOLDER, Finding, Status, findings
 from mbref.scene import Scene
+
+ROOT = Path(__file__).parents[3]
+RECORDS = sorted({*ROOT.glob("crosscheck/*/*.xz"), *ROOT.glob("reports/*/records.zip")} - {PUBLIC})
 
 
 def test_every_finding_has_sentences_and_a_violation_measured_by_one_proof() -> None:
@@ -23,6 +30,17 @@ def test_every_finding_has_sentences_and_a_violation_measured_by_one_proof() -> 
         assert found.crashes or not found.measured <= found.wrong_above, f"{found.name} is no violation"
         if found.scene:
             Scene.from_file(FOLDER / found.scene)
+
+
+@pytest.mark.parametrize("path", RECORDS, ids=lambda path: f"{path.parent.name}/{path.name}")
+def test_no_stored_run_ended_the_process_of_its_engine(path: Path) -> None:
+    """A record has scene and settings, so that whoever repeats it would lose the process. Records of
+    public files, which are left out, have names of files alone."""
+    content = lzma.decompress(path.read_bytes()) if path.suffix == ".xz" else b""
+    if not content:
+        with zipfile.ZipFile(path) as pack:
+            content = b"".join(map(pack.read, pack.namelist()))
+    assert content and b"ended by SIG" not in content
 
 
 def scripted(**fields: object) -> Finding:
