@@ -11,6 +11,7 @@ ROOT = Path(__file__).parents[2]
 PRODUCT = ("mbref", "crosscheck", "reports")
 TESTS = sorted(path for path in (ROOT / "tests").rglob("*.py") if "meta" not in path.parts)
 STAND_INS = {"SimpleNamespace", "mock", "mocker", "Mock", "MagicMock", "__new__"}
+PATCHING = ("setattr", "setitem", "delattr", "delitem")  # methods of ``monkeypatch``
 MOST_PATCHES = 60
 MOST_RATIO = 0.55  # lines of tests over lines of the product
 VAGUE = ("by_hand", "_parts", "details", "seldom", "rare", "interpreted", "limits_of", "misc")
@@ -77,6 +78,9 @@ def private_uses(path: Path) -> Iterator[str]:
     for node in nodes:
         if isinstance(node, ast.Attribute) and node.attr in private_names() - own:
             yield node.attr
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "getattr":
+            named = {each.value for each in named_in(node.args[1:2])}
+            yield from sorted(named & private_names() - own)
 
 
 def test_tests_use_no_private_name_of_the_product():
@@ -86,25 +90,28 @@ def test_tests_use_no_private_name_of_the_product():
 
 
 def patches(path: Path) -> Iterator[str]:
-    """Yield the dotted names of the product that a test file replaces by ``monkeypatch``."""
+    """Yield the names of the product that a test file replaces, by ``monkeypatch`` or by assignment."""
     product = imported_from_product(path)
     for node in ast.walk(parsed(path)):
-        if not (
-            isinstance(node, ast.Call)
-            and isinstance(node.func, ast.Attribute)
-            and node.func.attr == "setattr"
-        ):
+        called = node.func if isinstance(node, ast.Call) else None
+        if isinstance(called, ast.Attribute) and called.attr in PATCHING and node.args:
+            target, last = node.args[0], "".join(f".{ast.literal_eval(a)}" for a in named_in(node.args[1:2]))
+        elif isinstance(node, ast.Attribute | ast.Subscript) and isinstance(node.ctx, ast.Store):
+            target, last = node, ""
+        else:
             continue
-        target = node.args[0] if node.args else None
         if isinstance(target, ast.Constant) and str(target.value).partition(".")[0] in PRODUCT:
             yield str(target.value)
-        elif target is not None:
-            root = target
-            while isinstance(root, ast.Attribute):
-                root = root.value
-            if isinstance(root, ast.Name) and root.id in product:
-                last = node.args[1].value if isinstance(node.args[1], ast.Constant) else "?"
-                yield f"{product[root.id]}.{ast.unparse(target).partition('.')[2]}.{last}".replace("..", ".")
+        root = target
+        while isinstance(root, ast.Attribute | ast.Subscript):
+            root = root.value
+        if isinstance(root, ast.Name) and root.id in product:
+            yield f"{product[root.id]}{ast.unparse(target).removeprefix(root.id)}{last}"
+
+
+def named_in(arguments: list[ast.expr]) -> list[ast.expr]:
+    """Return the arguments that are names given as text."""
+    return [each for each in arguments if isinstance(each, ast.Constant) and isinstance(each.value, str)]
 
 
 def test_tests_patch_the_product_only_at_listed_seams():
