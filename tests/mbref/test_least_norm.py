@@ -43,7 +43,7 @@ def test_least_norm_solution_and_null_space_are_given_by_the_pseudo_inverse(seed
 @pytest.mark.parametrize("least", [1e-4, 1.1e-5, 0.9e-5, 1e-7, 1e-12])
 def test_singular_value_counts_only_above_the_tolerance(least):
     """NumPy's pseudo-inverse with the tolerance 1e-5 counts a fourth singular value of 1e-4 or 1.1e-5, and no
-    smaller one. Conditions up to 1e5 magnify the rounding 1e-16 to 1e-11."""
+    smaller one. Conditions up to 1e5 magnify the rounding 1e-16 to 1e-11; the limit is 100 times that."""
     matrix = unit_rows(0, 7, 9, [1.0, 1.0, 1.0, least])
     assert difference(matrix, matrix @ np.random.default_rng(0).normal(size=9)) < 1e-9
 

@@ -218,15 +218,15 @@ def test_animation_is_written_as_mp4(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("missing", "ending"), [("PIL", "gif"), ("imageio_ffmpeg", "mp4"), ("matplotlib.figure", "png")]
+    ("missing", "command", "ending"),
+    [("PIL", "animate", "gif"), ("imageio_ffmpeg", "animate", "mp4"), ("matplotlib.figure", "plot", "png")],
 )
 def test_picture_that_needs_a_missing_library_is_refused_with_the_extra_to_install(
-    missing, ending, tmp_path, monkeypatch, capsys
+    missing, command, ending, tmp_path, monkeypatch, capsys
 ):
     monkeypatch.setitem(sys.modules, missing, None)
     path = tmp_path / "my.toml"
     pendulum().save(path)
-    command = "plot" if ending == "png" else "animate"
     assert main([command, str(path), "--samples", "3", "--out", str(tmp_path / f"my.{ending}")]) == 2
     assert "pip install 'mbref[" in capsys.readouterr().err
 

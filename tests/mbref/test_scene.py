@@ -128,7 +128,6 @@ def test_spring_between_coincident_points_must_have_the_natural_length_zero():
 
 
 BROKEN = {
-    "missing": (None, "cannot be read"),
     "not TOML": (b"name = ", "is not TOML"),
     "too deep": (b"a = " + b"[" * 4000 + b"]" * 4000, "is nested too deeply"),
     "decimal number of 5000 digits": (b"a = " + b"1" * 5000, "is not TOML"),
@@ -139,11 +138,15 @@ BROKEN = {
 
 
 @pytest.mark.parametrize(("text", "says"), BROKEN.values(), ids=BROKEN)
-def test_file_missing_broken_too_deep_too_long_or_not_text_is_a_scene_error(text, says, tmp_path):
-    if text is not None:
-        (tmp_path / "strange.toml").write_bytes(text)
+def test_scene_file_that_is_broken_too_deep_too_long_or_no_text_is_refused(text, says, tmp_path):
+    (tmp_path / "strange.toml").write_bytes(text)
     with pytest.raises(SceneError, match=says):
         Scene.from_file(tmp_path / "strange.toml")
+
+
+def test_missing_scene_file_is_refused_as_unreadable(tmp_path):
+    with pytest.raises(SceneError, match="cannot be read"):
+        Scene.from_file(tmp_path / "missing.toml")
 
 
 def test_saved_scene_has_one_table_an_entry_and_one_field_a_line(tmp_path):

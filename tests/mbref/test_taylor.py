@@ -84,12 +84,14 @@ def test_pendulum_on_a_driven_cart_swings_in_a_constant_field(axis, length):
     assert np.linalg.norm(arm, axis=1) == pytest.approx(np.linalg.norm(place), rel=1e-12)
 
 
-@pytest.mark.parametrize("name", ["planar_slider_crank_equal", "planar_slider_crank_heavy"])
-def test_acceleration_at_a_singular_position_is_exact_and_reactions_are_open(name):
+@pytest.mark.parametrize(
+    ("name", "end"), [("planar_slider_crank_equal", 0.1), ("planar_slider_crank_heavy", 2.0)]
+)
+def test_acceleration_at_a_singular_position_is_exact_and_one_more_reaction_is_open(name, end):
     """The judge's closed form at the first crossing, just after it and later, to 100 rtol of the largest. At
     the crossing each joint has one more open component than later."""
     scene = SCENES[name]()
-    crossing = simulate(scene, "taylor", [2.0 if "heavy" in name else 0.1]).crossings[0].time
+    crossing = simulate(scene, "taylor", [end]).crossings[0].time
     times = crossing * np.array([1.0, 1.0 + 3e-7, 1.2])
     run, exact = simulate(scene, "taylor", times), truth_for(scene).poses(times).acceleration
     assert run.outcome.name == "COMPLETED", run.message

@@ -204,6 +204,7 @@ def test_verdict_on_a_files_own_settings_states_an_angle_in_rad_and_no_lever(tmp
     ids=["right", "failed", "no truth"],
 )
 def test_verdict_on_right_failed_and_unjudged_runs_proposes_no_tuning(tmp_path, changes, says):
+    """Right is an error of 1e-9; a run without a known error is judged by its closures alone."""
     said = sentence(imported(tmp_path, FOUR_BAR, TILTED), **changes)
     assert says in said and "tune" not in said, said
 
@@ -213,6 +214,7 @@ def test_run_of_another_family_has_no_verdict_on_the_files_own_settings(tmp_path
 
 
 def test_a_free_base_is_reported_with_the_option_that_holds_it(tmp_path):
+    """Gravity accelerates all parts of the dog on its free joint alike, so that no joint is loaded."""
     free = imported(tmp_path, DOG)
     (said,) = free_falls([Judged(free, {}, [])])
     assert "verifies nothing but gravity: `--hold trunk`" in said
@@ -228,6 +230,7 @@ def test_hold_fixes_the_base_at_the_pose_of_the_keyframe(tmp_path):
 
 
 def test_mujocos_model_of_a_file_with_a_held_base_begins_at_the_pose_of_the_scene(tmp_path):
+    """The keyframe "high" has the trunk at (1, 0, 2) m and the leg at 0.3 rad."""
     fixed = imported(tmp_path, DOG, ImportOptions(hold=["trunk"], keyframe="high"))
     run = engine("mujoco").run(fixed, np.array([0.0, 0.2]), setting_of(fixed, STIFFER_RK4))
     assert run.position[0, 0] == pytest.approx(fixed.body[0].position, abs=ROUNDING)
@@ -244,6 +247,7 @@ def test_a_body_on_a_joint_to_the_ground_does_not_fall_freely(name):
 
 
 def test_a_free_body_falls_freely_only_with_gravity_and_without_spin():
+    """Its motion is g t² / 2 then; a spin adds Euler's equations, and without gravity nothing falls."""
     still = SCENES["heavy_top"]().with_(joint=()).with_("body[0].angular_velocity", (0.0, 0.0, 0.0))
     assert falls_freely(still)
     assert not falls_freely(still.with_("body[0].angular_velocity", (1.0, 2.0, 3.0)))

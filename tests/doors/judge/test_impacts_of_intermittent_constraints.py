@@ -74,7 +74,8 @@ def test_random_impacts_of_mbref_balance_by_the_judge(seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(200))
 def test_many_random_motions_through_impacts_agree_with_the_reference(seed):
-    """Each tenth mechanism is moved by both formulations."""
+    """Positions (m) agree to 1000 rtol, 1e-11, as impacts magnify errors. A motion may end early with a
+    reason."""
     scene = intermittent_mechanism(seed)
     run = mbref.simulate(scene, times=TIMES, rtol=1e-11)
     found = measure(scene, run)
@@ -83,10 +84,16 @@ def test_many_random_motions_through_impacts_agree_with_the_reference(seed):
     reached = min(len(one.times), len(run.times))
     assert reached == len(TIMES) or one.reason or run.message
     assert np.abs(doubles(one.position)[:reached] - run.position[:reached]).max() <= 1e-8
-    if seed % 10 == 0:
-        other = motion_by(tree_motion, scene, TIMES, EXTENDED)
-        k = min(len(one.times), len(other.times))
-        assert np.abs(doubles(one.position[:k] - other.position[:k])).max() <= 1e-11
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(0, 200, 10))
+def test_both_formulations_of_the_reference_move_random_mechanisms_alike_through_impacts(seed):
+    """Natural coordinates and the tree of joints share no equations of motion; positions in m."""
+    scene = intermittent_mechanism(seed)
+    one, other = (motion_by(f, scene, TIMES, EXTENDED) for f in FORMULATIONS.values())
+    k = min(len(one.times), len(other.times))
+    assert np.abs(doubles(one.position[:k] - other.position[:k])).max() <= 100 * ROUNDING
 
 
 def test_wrong_impacts_are_measured():
@@ -101,7 +108,7 @@ def test_wrong_impacts_are_measured():
     assert all(measure(scene, run)[name] <= ROUNDING for name in changes)
     for name, change in changes.items():
         wrong = replace(run, events=(replace(latched, **change), *run.events[1:]))
-        assert measure(scene, wrong)[name] > 1e-3
+        assert measure(scene, wrong)[name] > 1e-3  # a tenth of the least change
 
 
 SWITCHED = {  # m, m/s, rad/s; five times the error of MuJoCo's steps of 1 ms with soft equalities

@@ -251,41 +251,40 @@ def short_run(make) -> Trajectory:
     return truth_for(scene).poses(gate_times(scene))
 
 
-START = {
-    "initial position": ("position", 0, 1e-4, scene_length),
-    "initial velocity": ("velocity", 0, 1e-4, None),
-    "initial angular velocity": ("angular_velocity", 0, 1e-4, None),
-    "change of velocity": ("velocity", 1, 1e-2, None),
-    "change of angular velocity": ("angular_velocity", 1, 1e-2, None),
-    "initial acceleration": ("acceleration", 0, 5.0, None),
-    "initial angular acceleration": ("angular_acceleration", 0, 5.0, None),
+START = {  # field in the gate's sentence: array of the run, sample, length of the vector that is added
+    "initial position": ("position", 0, 1e-4),
+    "initial velocity": ("velocity", 0, 1e-4),
+    "initial angular velocity": ("angular_velocity", 0, 1e-4),
+    "change of velocity": ("velocity", 1, 1e-2),
+    "change of angular velocity": ("angular_velocity", 1, 1e-2),
+    "initial acceleration": ("acceleration", 0, 5.0),
+    "initial angular acceleration": ("angular_acceleration", 0, 5.0),
 }
+
+
+def by_gate(make, field: str, times: float):
+    """Return the gate's difference of the true run and one with ``times`` the vector of START added."""
+    scene, run = make(), short_run(make)
+    name, sample, size = START[field]
+    off = changed(getattr(run, name), sample, -1, times * size * AXIS)
+    return gate(scene, [run, replace(run, engine="other", **{name: off})])
 
 
 @pytest.mark.parametrize("make", [double_hinge, MOTIONS["planet with armatures"]])
 @pytest.mark.parametrize("field", START)
-def test_gate_names_the_quantity_that_differs_and_its_size(make, field):
-    """A vector of the length in START is added to one array of the true run, at the start or the next sample.
-    The gate names its field; twice the vector has twice the size, and positions count in scene lengths."""
-    scene, run = make(), short_run(make)
-    name, sample, size, scale = START[field]
-    assert gate(scene, [run, replace(run, engine="other")]) is None
-    once, twice = (
-        gate(
-            scene,
-            [
-                run,
-                replace(
-                    run, engine="other", **{name: changed(getattr(run, name), sample, -1, k * size * AXIS)}
-                ),
-            ],
-        )
-        for k in (1, 2)
-    )
+def test_gate_names_the_field_that_differs_and_twice_the_difference_has_twice_the_size(make, field):
+    """A vector is added to one array of the true run of the last body, at the start or the next sample."""
+    run = short_run(make)
+    assert gate(make(), [run, replace(run, engine="other")]) is None
+    once, twice = by_gate(make, field, 1), by_gate(make, field, 2)
     assert once.field == twice.field == field and once.engines == ("truth", "other")
-    assert twice.by == pytest.approx(2 * once.by, rel=1e-6)
-    if scale is not None:
-        assert once.by == pytest.approx(size / scale(scene), rel=1e-6)
+    assert twice.by == pytest.approx(2 * once.by, rel=1e-6)  # rounding of 1e-10 of positions of 1e-4 lengths
+
+
+def test_gate_states_a_difference_of_positions_in_lengths_of_the_mechanism():
+    """0.1 mm of the double hinge's length, √(0.9² + 0.3² + 0.2²) m."""
+    found = by_gate(double_hinge, "initial position", 1)
+    assert found.by == pytest.approx(1e-4 / LENGTHS[double_hinge], rel=1e-6)  # rounding
 
 
 @pytest.mark.parametrize("change", ["mass", "inertia"])

@@ -65,7 +65,8 @@ def test_jacobian_and_right_hand_sides_are_differences_of_the_constraints(name):
         state = moved(T, sign * STEP * v), v
         after = mbref.terms(scene, T.t + sign * STEP, state)
         rates.append(after.Phi_q @ v - after.nu)
-    assert np.abs((rates[0] - rates[1]) / (2 * STEP) + T.gamma).max() < 1e-7 * max(1.0, np.abs(T.gamma).max())
+    limit = 10 * CLOSE * max(1.0, np.abs(T.gamma).max())
+    assert np.abs((rates[0] - rates[1]) / (2 * STEP) + T.gamma).max() < limit
 
 
 def test_units_of_rows_say_how_they_scale_with_the_mechanism():
@@ -131,11 +132,11 @@ def test_projection_holds_the_joints_of_an_own_formulation_to_rounding():
     """Violations of a gear pair in m and rad."""
     own = {"formulation": pseudo_inverse, "stabilisation": "projection"}
     motion = mbref.simulate(gear_pair(), times=[0.5, 1.0], **own)
-    assert motion.violation.position.max() < 1e-13
+    assert motion.violation.position.max() < 1e-13  # 500 roundings
 
 
 def test_own_formulation_follows_loads_that_are_switched():
-    """A force of 1 N/kg acts from 0.5 s to 1.5 s: v t from then on, to rounding of few steps."""
+    """A force of 1 N/kg acts from 0.5 s to 1.5 s: v t from then on, to the default rtol, 1e-9."""
     scene = loads_over_time.pushed(Factor(start=0.5, stop=1.5))
     motion = mbref.simulate(scene, times=[0.0, 0.5, 1.0, 1.5, 2.0], formulation=pseudo_inverse)
     along = motion.joint("J").displacement

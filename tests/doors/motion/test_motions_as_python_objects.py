@@ -66,6 +66,7 @@ def test_motion_is_a_dictionary_of_its_bodies_and_equal_to_itself_only(crank):
         (lambda: Revolute(name="A", bodies=("a", "b"), anchor=(0, 0, 0), axi=(0, 0, 1)), "mean 'axis'"),
         (mbref.Scene, "body: is required"),
     ],
+    ids=["two numbers for three", "newtons for kilograms", "misspelt field", "nothing given"],
 )
 def test_faulty_entry_made_in_python_has_sentences_and_no_page(make, says):
     with pytest.raises(mbref.SceneError, match=says) as caught:

@@ -117,7 +117,7 @@ def test_drivers_of_two_coupled_wheels_agree_over_many_turns_or_are_named():
     ids=["driven crank", "driven slider"],
 )
 def test_single_driver_at_a_dead_position_is_no_contradiction_of_drivers(made):
-    """The run ends at the time of the closed form, which its message names."""
+    """The run ends at the time of the closed form, to 1e-9 of it, and its message names this time."""
     scene, dead = made()
     run = simulate(scene, times=[0.5 * dead, 2.0 * dead])
     assert run.t_end == pytest.approx(dead, rel=1e-9) and run.times.tolist() == [0.5 * dead]
