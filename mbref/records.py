@@ -23,6 +23,7 @@ from mbref.input_error import InputError
 COMPRESSED = b"\xfd7zXZ\x00"  # first bytes of a compressed file
 
 INFINITE_MARKS = {math.inf: "\ue000+", -math.inf: "\ue000-"}  # placeholders until the text is made
+NO_MARKS: Mapping[float, str] = {}
 
 
 class RecordsError(InputError):
@@ -142,18 +143,19 @@ def json_content(path: str | Path) -> Any:
 def strict_json(value: Any) -> str:
     """Return the value as JSON that any reader accepts: NaN becomes null, an infinite number becomes
     1e999."""
-    text = json.dumps(_finite(value), allow_nan=False)
+    text = json.dumps(finite(value, INFINITE_MARKS), allow_nan=False)
     for number, mark in INFINITE_MARKS.items():
         text = text.replace(json.dumps(mark), f"{math.copysign(1, number):.0f}e999")
     return text
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any, marks: Mapping[float, str] = NO_MARKS) -> Any:
+    """Return the value with None for numbers that are not finite, or with their marks."""
     if isinstance(value, Mapping):
-        return {key: _finite(v) for key, v in value.items()}
+        return {key: finite(v, marks) for key, v in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(v) for v in value]
-    return INFINITE_MARKS.get(value) if isinstance(value, float) and not math.isfinite(value) else value
+        return [finite(v, marks) for v in value]
+    return marks.get(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _record(line: bytes) -> dict[str, Any] | None:

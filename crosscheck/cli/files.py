@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-import math
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -29,7 +28,7 @@ from crosscheck.files.repairs import Advice, advice
 from crosscheck.files.words import heading, is_announced, part, shown, verdict
 from crosscheck.study.progress import counted, narrated
 from crosscheck.versions.environment import NotInstalled
-from mbref.records import rewrite
+from mbref.records import finite, rewrite
 
 LOOKS = {SAME: "green", ALMOST: "yellow", ANOTHER: "bold red", REFUSED: "magenta"}
 SIGNS = {
@@ -131,17 +130,8 @@ def _show_corpus(out: Console, found: Sequence[records.Record]) -> None:
 
 def document(file: File, found: Sequence[Reading], tried: Sequence[Advice]) -> dict[str, Any]:
     """Return the JSON document of a file; null is no limit, or a number that the reader does not give."""
-    made: dict[str, Any] = _finite(_document(file, found, tried))
+    made: dict[str, Any] = finite(_document(file, found, tried))
     return made
-
-
-def _finite(value: Any) -> Any:
-    """Return a document with null for numbers that are not finite, which JSON does not have."""
-    if isinstance(value, dict):
-        return {key: _finite(part) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(part) for part in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _document(file: File, found: Sequence[Reading], tried: Sequence[Advice]) -> dict[str, Any]:

@@ -105,20 +105,19 @@ def _looked_at(runner: Runner, failure: Failure, family: str) -> Iterator[tuple[
 def explanations(bench: Bench) -> Changes:
     """Return the changes that explain the wrong accelerations of a bench's engine; None if the accelerations
     are right."""
-    scene, motion, middle = bench.scene, bench.close, NEIGHBOURS
-    own = _differences(scene, bench)
-    right = accelerations(scene, terms_at(scene, motion, middle))
+    scene, orientation = bench.scene, bench.close.orientation[NEIGHBOURS]
+    own, terms = _differences(scene, bench), terms_at(scene, bench.close, NEIGHBOURS)
+    right = accelerations(scene, terms)
     difference = float(np.linalg.norm(own - right))
     if not np.isfinite(difference):
         raise Broken("the terms of its motion are not known")
     if difference <= WRONG * max(float(np.linalg.norm(right)), _least(scene)) + _rounded(bench):
         return None
     explains = partial(_explains, scene, own, EXPLAINED * difference)
-    found = {
-        (each.part, each.change): True for each in variants(scene, motion, middle) if explains(each.terms)
-    }
-    freedoms = len(own) - rank_of(np.linalg.svd(terms_at(scene, motion, middle).rows, compute_uv=False))
-    for scaled in scaled_terms(scene, motion, middle):
+    changed = variants(scene, orientation, terms)
+    found = {(each.part, each.change): True for each in changed if explains(each.terms)}
+    freedoms = len(own) - rank_of(np.linalg.svd(terms.rows, compute_uv=False))
+    for scaled in scaled_terms(scene, terms):
         factor = _factor(scene, scaled, own)
         words = _words(factor)
         if explains(scaled.times(factor)):

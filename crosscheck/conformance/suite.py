@@ -24,6 +24,7 @@ from crosscheck.conformance.trial import Bench, Broken, NoExact, set_up
 from crosscheck.engine import engine
 from crosscheck.processes.interrupts import calls_ended
 from crosscheck.processes.pool import ChildFailed
+from mbref.records import finite
 
 PASS, FAIL, CANNOT, OUTSIDE = "pass", "fail", "cannot", "outside"
 EXPECTED = "expected"  # a failure that the author of the engine expects
@@ -91,7 +92,7 @@ class Conformance:
 
 def record_of(verdict: Verdict) -> dict[str, Any]:
     """Return a verdict as a JSON record; numbers that are not finite are null."""
-    return {"card": verdict.check(), **{k: _finite(v) for k, v in asdict(verdict).items()}}
+    return {"card": verdict.check(), **finite(asdict(verdict))}
 
 
 def runner(name: str, time_limit: float, in_process: bool = False) -> Runner:
@@ -305,7 +306,3 @@ def _summary(conformance: Conformance) -> Text:
     late = f"; left out by the time budget: {', '.join(conformance.left_out)}" if conformance.left_out else ""
     ran = f"{len(run)} of {len(scenes)} scenes run"
     return Text(f"{conformance.engine}: {', '.join(counts)}; {ran}{late}{nothing}")
-
-
-def _finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -88,10 +88,19 @@ def accelerations(scene: Scene, terms: Terms) -> np.ndarray:
     return of_least_constraint(terms.mass, force, terms.rows, -gamma, weights)
 
 
-def variants(scene: Scene, motion: Trajectory, sample: int) -> Iterator[Variant]:
-    """Yield variants of the terms at a sample: inertias about other axes, or without a joint's rows."""
-    terms = terms_at(scene, motion, sample)
-    yield from _other_masses(scene, motion.orientation[sample], terms)
+def variants(scene: Scene, orientation: np.ndarray, terms: Terms) -> Iterator[Variant]:
+    """Yield variants of the terms at orientations (nb, 4): inertias about other axes, or without a joint's
+    rows."""
+    own, turn = inertia_matrices(scene), rotations.to_matrix(orientation)
+    diagonal = np.array([np.diag(np.diag(matrix)) for matrix in own])
+    back = np.swapaxes(turn, 1, 2)
+    others = {
+        "inertias not turned from body to world axes": own,
+        "inertias turned the wrong way, Rᵀ J R for R J Rᵀ": back @ own @ turn,
+        "products of inertia left out": turn @ diagonal @ back,
+    }
+    for change, inertia in others.items():
+        yield Variant(PARTS[0], change, terms._replace(mass=_mass(scene, orientation, inertia)))
     for joint in dict.fromkeys(terms.joints):
         kept = np.array([name != joint for name in terms.joints])
         rows = {key: getattr(terms, key)[kept] for key in ("rows", "of_velocities", "of_drivers")}
@@ -99,10 +108,9 @@ def variants(scene: Scene, motion: Trajectory, sample: int) -> Iterator[Variant]
         yield Variant(PARTS[4], f"joint {joint!r} left out", terms._replace(joints=names, **rows))
 
 
-def scaled_terms(scene: Scene, motion: Trajectory, sample: int) -> Iterator[Scaled]:
-    """Yield each term at a sample for multiples of it: forces, parts of γ, and mass and inertia of a body,
-    with the gravity and gyroscopic moment that they cause."""
-    terms = terms_at(scene, motion, sample)
+def scaled_terms(scene: Scene, terms: Terms) -> Iterator[Scaled]:
+    """Yield each term for multiples of it: forces, parts of γ, and mass and inertia of a body, with the
+    gravity and gyroscopic moment that they cause."""
     for name in terms.forces:
         part = {GRAVITY: PARTS[1], GYRATION: PARTS[2]}.get(name, PARTS[3])
         yield Scaled(part, name, partial(_with_forces, terms, {name}))
@@ -204,17 +212,3 @@ def _mass(scene: Scene, orientation: np.ndarray, inertia: np.ndarray | None = No
         mass[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = (body.mass or 0.0) * np.eye(3)
         mass[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = inertia[b]
     return mass
-
-
-def _other_masses(scene: Scene, orientation: np.ndarray, terms: Terms) -> Iterator[Variant]:
-    """Return mass matrices for inertias along other axes, and for inertias without products of inertia."""
-    own, turn = inertia_matrices(scene), rotations.to_matrix(orientation)
-    diagonal = np.array([np.diag(np.diag(matrix)) for matrix in own])
-    back = np.swapaxes(turn, 1, 2)
-    others = {
-        "inertias not turned from body to world axes": own,
-        "inertias turned the wrong way, Rᵀ J R for R J Rᵀ": back @ own @ turn,
-        "products of inertia left out": turn @ diagonal @ back,
-    }
-    for change, inertia in others.items():
-        yield Variant(PARTS[0], change, terms._replace(mass=_mass(scene, orientation, inertia)))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from crosscheck.judge.reference.cache import mechanism
 from crosscheck.setting import ORIGIN
 from crosscheck.study.grid import Record
 from mbref.motions.trajectory import Outcome
+from mbref.records import finite
 from mbref.scene import Scene
 
 PUBLIC = (
@@ -35,15 +36,7 @@ UNTIMED = 1e-6  # s; lower end of the axis of times, also for runs that report n
 def public(record: Record) -> Record:
     """Return the fields of a record that ``--json`` prints; ``timing`` only if the run was timed. Numbers
     that are not finite become null."""
-    return {name: _finite(record[name]) for name in (*PUBLIC, "timing") if name in record}
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {k: _finite(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return {name: finite(record[name]) for name in (*PUBLIC, "timing") if name in record}
 
 
 def is_completed(record: Record) -> bool:
