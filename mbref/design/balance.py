@@ -47,7 +47,10 @@ class Newton:
         # largest steps (f,): LONGEST_STEP of a body
         self.longest = LONGEST_STEP / norms_by_body(moves).max(axis=0)
         pushes = self._pushes(tangent.forces)
-        placed = PLACED * self.stiffness / self.sizes
+        # rounding of a pose accelerates stiff directions, rounding of all forces those without stiffness
+        largest = PLACED * pushes.max(initial=0.0)
+        is_flat = self.stiffness * UNDECIDED / self.sizes <= largest
+        placed = PLACED * self.stiffness / self.sizes + np.where(is_flat, largest, 0.0)
         self.bound, self.rounding = BALANCED * pushes + placed, BALANCE_ROUNDING * pushes + placed / 16
 
     def parts(self, off: np.ndarray) -> np.ndarray:
@@ -73,9 +76,7 @@ class Newton:
 
     def step(self) -> np.ndarray:
         """Return the Newton step y (f,): at most LONGEST_STEP of a body along each direction."""
-        parts = self.parts(self.off)
-        moves = np.where(np.abs(parts) <= self._negligible, 0.0, -parts / self._least_stiffness)
-        return np.asarray(self.directions @ moves)
+        return np.asarray(self.directions @ -self._displacements(self.off))
 
     def fall(self) -> np.ndarray:
         """Return the step y (f,) with the accelerations, over the sizes of the stiffness."""
@@ -94,7 +95,12 @@ class Newton:
 
     def level(self, off: np.ndarray) -> float:
         """Return the size of x'' (n,) as a displacement, lengths or rad, by the stiffness of this pose."""
-        return float(np.linalg.norm(self.parts(off) / self._least_stiffness * self.sizes))
+        return float(np.linalg.norm(self._displacements(off) * self.sizes))
+
+    def _displacements(self, off: np.ndarray) -> np.ndarray:
+        """Return the displacements (f,) by x'' (n,) over the stiffness; 0 where it is negligible."""
+        parts = self.parts(off)
+        return np.where(np.abs(parts) <= self._negligible, 0.0, parts / self._least_stiffness)
 
     def moved(self, y: np.ndarray) -> Tangent | None:
         """Return the tangent at q(y), after a return to the balance of stiff directions; None if no pose on

@@ -17,7 +17,7 @@ from mbref.equations.model import Model, poses
 from mbref.input_error import InputError
 from mbref.motions.event import STATE_BEFORE, Event
 from mbref.motions.joint_motion import along, joint_motion, positions_of, turned_since_start
-from mbref.motions.restart import scene_at
+from mbref.motions.restart import sample_at, scene_at
 from mbref.motions.trajectory import PER_BODY, Trajectory
 from mbref.scene import Coupling, Joint, Scene, SceneError
 from mbref.scene.structure import intermittent
@@ -202,13 +202,12 @@ def restarted(scene: Scene, motion: Trajectory, t: float) -> Scene:
     """
     if not is_intermittent(scene):
         return scene_at(scene, motion, t)
-    frame = scene_at(_always(scene), motion, t)
-    at = scene.duration - frame.duration if scene.duration > t else t
+    k = sample_at(motion, t)
+    frame, at = scene_at(_always(scene), motion, t), float(motion.times[k])
     pieces = [(piece, part.times) for piece, part in parts_of(scene, motion)]
     piece = pieces[sum(event.time <= at for event in motion.events or ())][0]
     placed = {joint.name: joint for joint in scene_at(_bare(piece), motion, t).joint}
-    chosen = np.abs(motion.times - at).argmin()
-    state = _samples(motion, np.arange(len(motion.times)) == chosen, 0.0, {})
+    state = _samples(motion, np.arange(len(motion.times)) == k, 0.0, {})
     joints, couplings = [], []
     for joint in scene.joint:
         later = _from_time(joint, at)

@@ -18,7 +18,7 @@ SAME_TIME = 1e-9  # difference of times / largest sample time that is rounding o
 def scene_at(scene: Scene, motion: Trajectory, t: float) -> Scene:
     """Return the scene that starts with the state of a motion at a sample time t (s); raises InputError if
     there is no such sample, or if the motion has lost count of the turns of a torsion spring."""
-    k = _sample(motion, t)
+    k = sample_at(motion, t)
     start = assembled(scene)
     model = Model(start)
     order = [motion.bodies.index(body.name) for body in scene.body]
@@ -57,7 +57,7 @@ def _from_time(load: Load, t: float) -> Load | None:
     return None if factor is None else load.model_copy(update={"factor": factor})
 
 
-def _sample(motion: Trajectory, t: float) -> int:
+def sample_at(motion: Trajectory, t: float) -> int:
     """Return the index of the sample at t (s); raises InputError that names the nearest one."""
     if not motion.times.size:
         raise InputError("scene_at: the motion has no sample; simulate it with sample times")

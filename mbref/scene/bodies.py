@@ -30,6 +30,7 @@ from mbref.scene.validation import checked_inertia
 
 DRIVER = "driver({})"  # name of the driver of a joint in columns and records
 UNIT_TOLERANCE = 1e-6  # largest deviation of a quaternion from unit length that counts as rounding
+START_ROUNDING = 1e-12  # value of a driver at t = 0 / its largest term, or 1 m or rad, that is rounding
 
 
 InertiaValue = tuple[float, float, float] | tuple[VectorValue, VectorValue, VectorValue] | None
@@ -106,12 +107,14 @@ class Driver(TimeFunction):
             return polynomial  # a fault of another field is reported
         sine, table = info.data["sine"], info.data["table"]
         start = polynomial[0] + (sine.amplitude * math.sin(sine.phase) if sine else 0.0)
+        size = abs(polynomial[0]) + (abs(sine.amplitude) if sine else 0.0)
         what = "c0 + amplitude·sin(phase) must be 0, motion is measured from t = 0"
         if table:
             rows = {"table": table, "periodic": info.data["periodic"]}
             start += cls.model_construct(sine=None, polynomial=(0.0,), **rows).pieces()[0].cubic[0]
+            size += max(abs(value) for _, value in table)
             what = "the value at t = 0 must be 0, because the motion is measured from its start"
-        if abs(start) > 1e-12:  # otherwise it is rounding
+        if abs(start) > START_ROUNDING * max(1.0, size):
             raise ValueError(f"{what}; got {start:g}")
         return polynomial
 

@@ -46,3 +46,19 @@ def parallelogram(angle_sine: float, angle_cosine: float) -> Scene:
         hinge("D", ("ground", "rocker"), (1.0, 0.0, 0.0)),
     ]
     return Scene(name="parallelogram", gravity=(0.5, -G, 0.0), body=bodies, joint=joints)
+
+
+def ball_linkage(ends: tuple[str, str] = ("spherical", "spherical")) -> Scene:
+    """A spatial four-bar: two cranks on hinges, and a coupler between two joints of given types."""
+    bodies = [rod("crank", (0, 0.25, 0.0)), rod("coupler", (0.5, 0.5, 0.1)), rod("rocker", (1.0, 0.25, 0.1))]
+    places = ((0.0, 0.5, 0.0), (1.0, 0.5, 0.2))
+    joints = [
+        hinge("A", ("ground", "crank")),
+        hinge("D", ("ground", "rocker"), (1.0, 0.0, 0.0), (0.1, 0.0, 1.0)),
+    ]
+    for name, kind, pair, place in zip(
+        "BC", ends, (("crank", "coupler"), ("coupler", "rocker")), places, strict=True
+    ):
+        axes = {"axes": [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]} if kind == "universal" else {}
+        joints.append({"name": name, "type": kind, "bodies": list(pair), "anchor": list(place), **axes})
+    return Scene(name="ball_linkage", body=bodies, joint=joints)

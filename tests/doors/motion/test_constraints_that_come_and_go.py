@@ -120,6 +120,12 @@ def test_scene_at_a_sample_between_events_continues_the_motion(motion, t):
     assert np.abs(rest.position[-1] - motion.position[-1]).max() < 1e-9
 
 
+def test_scene_at_an_event_starts_with_the_state_after_it():
+    """Carts that latch at 0.1 s are latched from the start on: only their release is left."""
+    latched = mbref.simulate(carts(), times=[0.0, 0.1]).scene_at(0.1)
+    assert [event.released for event in mbref.simulate(latched).events] == [("L",)]
+
+
 def test_saved_motion_with_events_has_its_mechanism_and_columns(motion, tmp_path):
     """Columns are computed anew from the states in the file, to rounding."""
     motion.save(tmp_path / "motion.json")

@@ -6,7 +6,7 @@ import pytest
 from crosscheck.conformance.changes.units import in_other_units, scaled
 from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from mbref import Outcome, Scene, find_scene, simulate
-from tests.helpers.statics import ORIGIN, hinge, rod
+from tests.helpers.statics import ORIGIN, hinge, rod, slide
 
 
 def ends(scene: Scene) -> tuple[tuple[Outcome, str, int], np.ndarray]:
@@ -50,6 +50,18 @@ def test_torque_of_a_rack_and_pinion_is_its_closed_form_at_every_size(length, ma
     angle, inertia = 2.0 * 0.5 + 3.0 * 0.5**2, 0.3 + 0.4 + 0.2**2 * (1.5 + 0.7)
     assert run.joint("B").displacement / length == pytest.approx([0.01 - 0.2 * angle], rel=1e-10)
     assert run.driver("A").torque / (mass * length**2) == pytest.approx([6.0 * inertia], rel=1e-9)
+
+
+@pytest.mark.parametrize("length", [1e-6, 1e7])
+def test_wave_of_a_driver_that_begins_at_zero_to_rounding_is_accepted_at_every_size(length):
+    """The displacement is A (sin(t + p) - sin p), A = 0.12 m and p = 0.7 rad."""
+    start = round(-0.12 * np.sin(0.7), 14)  # as in a file
+    driver = {"joint": "S", "polynomial": [start], "sine": {"amplitude": 0.12, "phase": 0.7}}
+    guide = slide("S", "block", ORIGIN, (1.0, 0.0, 0.0))
+    scene = Scene(name="wave", body=[rod("block", ORIGIN)], joint=[guide], driver=[driver])
+    run = simulate(in_other_units(scene, length, 1.0), times=[0.5])
+    wave = 0.12 * (np.sin(1.2) - np.sin(0.7))
+    assert run.joint("S").displacement / length == pytest.approx([wave], rel=1e-12)
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.judge.mobility import mobility
 from mbref import Scene, diagnose, exchanges, find_scene
 from mbref.cli.commands import main
-from tests.helpers.statics import hinge, parallelogram, rod
+from tests.helpers.statics import ball_linkage, hinge, parallelogram, rod
 
 SIZES = (1e-6, 1e-3, 1e3, 1e6)
 
@@ -17,22 +17,6 @@ SIZES = (1e-6, 1e-3, 1e3, 1e6)
 def diagnosis_of(scene: Scene) -> tuple:
     found = diagnose(scene)
     return found.counts, found.redundant_by_joint, found.unique_reactions, found.determined_reactions
-
-
-def ball_linkage(ends: tuple[str, str] = ("spherical", "spherical")) -> Scene:
-    """A spatial four-bar: two cranks on hinges, and a coupler between two joints of given types."""
-    bodies = [rod("crank", (0, 0.25, 0.0)), rod("coupler", (0.5, 0.5, 0.1)), rod("rocker", (1.0, 0.25, 0.1))]
-    places = ((0.0, 0.5, 0.0), (1.0, 0.5, 0.2))
-    joints = [
-        hinge("A", ("ground", "crank")),
-        hinge("D", ("ground", "rocker"), (1.0, 0.0, 0.0), (0.1, 0.0, 1.0)),
-    ]
-    for name, kind, pair, place in zip(
-        "BC", ends, (("crank", "coupler"), ("coupler", "rocker")), places, strict=True
-    ):
-        axes = {"axes": [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]} if kind == "universal" else {}
-        joints.append({"name": name, "type": kind, "bodies": list(pair), "anchor": list(place), **axes})
-    return Scene(name="ball_linkage", body=bodies, joint=joints)
 
 
 @pytest.mark.parametrize(

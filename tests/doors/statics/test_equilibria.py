@@ -10,7 +10,7 @@ from mbref import Scene, equilibria
 from mbref.cli.commands import main
 from mbref.scene import Spring
 from tests.helpers import parts
-from tests.helpers.statics import DOWN, ORIGIN, G, hinge, parallelogram, pendulum, rod, slide
+from tests.helpers.statics import DOWN, ORIGIN, G, ball_linkage, hinge, parallelogram, pendulum, rod, slide
 
 MASS, INERTIA, ARM = 2.0, 0.3, 0.7
 ABOUT_HINGE = INERTIA + MASS * ARM**2
@@ -295,6 +295,21 @@ def test_angle_of_a_wheel_that_no_force_turns_makes_one_indifferent_equilibrium(
     joints = [hinge("A", ("ground", "rod")), hinge("W", ("rod", "wheel"), (0.0, -2 * ARM, 0.0))]
     found = equilibria(Scene(name="wheel", gravity=DOWN, body=bodies, joint=joints), starts=5)
     assert [each.stability for each in found if each.scene.body[0].position[1] < 0] == ["indifferent"]
+
+
+@pytest.mark.parametrize("gravity", [DOWN, (3.0, -5.0, -7.0)])
+def test_linkage_whose_coupler_spins_idly_has_the_equilibria_of_one_whose_universal_joint_holds_it(gravity):
+    """No force turns the coupler about its axis: its centre rests at the same places (m), and two eigenvalues
+    (1/s) are zero within their bounds."""
+    free, held = (
+        equilibria(ball_linkage((end, "spherical")).with_(gravity=gravity), 4)
+        for end in ("spherical", "universal")
+    )
+    assert [each.stability for each in held] == ["unstable", "stable", "stable"]
+    assert sorted(each.stability for each in free) == ["indifferent", "indifferent", "unstable"]
+    places = [np.array(sorted(each.scene.body[1].position for each in found)) for found in (free, held)]
+    assert np.allclose(*places, rtol=0.0, atol=CLOSE)
+    assert all((np.abs(each.eigenvalues) <= each.bounds).sum() == 2 for each in free)
 
 
 def test_bounds_of_eigenvalues_in_json_are_at_least_their_errors(tmp_path, capsys):
