@@ -148,8 +148,6 @@ def test_command_prints_mean_and_deviation_of_single_runs(tmp_path: Path, capsys
     assert np.allclose(printed["mean_position"]["slider"], places.mean(axis=0), rtol=0, atol=rounding)
     assert np.allclose(printed["deviation_position"]["slider"], places.std(axis=0), rtol=0, atol=rounding)
     assert len(path.read_text().splitlines()) == 4
-    main(command)
-    assert "4 of 4 variants completed" in (said := capsys.readouterr().out) and "runs a second" in said
 
 
 def test_killed_process_loses_only_the_call_that_killed_it(tmp_path: Path):

@@ -88,8 +88,8 @@ def test_page_of_the_scene_format_shows_a_figure_of_every_joint_and_load_and_of_
     assert sorted(shown) == sorted(wanted)
 
 
-def test_site_draws_every_load_that_the_page_of_the_scene_format_shows():
-    """LOADS and OF_SLIDES of docs/hooks.py are the loads that are drawn; joints are drawn by their types."""
+def test_site_draws_a_figure_of_every_type_of_load():
+    """LOADS and OF_SLIDES of docs/hooks.py list the loads that it draws when the site is built."""
     pytest.importorskip("mkdocs", reason="the extra docs builds the site")
     pytest.importorskip("latex2mathml", reason="the extra docs builds the site")
     import hooks

@@ -65,7 +65,8 @@ def unread(root: ET.Element, known: Mapping[str, Collection[str]]) -> Iterator[s
     for outer in root.iter():
         if outer.tag not in known:
             continue
-        name = f"{outer.tag} {outer.get('name')!r}" if outer.get("name") else f"a {outer.tag}"
+        article = "an" if outer.tag[0] in "aeiou" else "a"
+        name = f"{outer.tag} {outer.get('name')!r}" if outer.get("name") else f"{article} {outer.tag}"
         for element in outer:
             if isinstance(element.tag, str) and element.tag not in known[outer.tag]:
                 found.setdefault(element.tag, []).append(name)

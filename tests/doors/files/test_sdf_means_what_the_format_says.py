@@ -60,7 +60,7 @@ def test_an_axis_is_in_the_frame_of_the_model_by_the_rule_of_its_version(files, 
     shoulder = joint("shoulder", "revolute", "world", "arm", "1 0 0", inside=given)
     scene, notes = files.scene(sdf(arm, shoulder, version=version), "arm.sdf")
     assert scene.joint_named("shoulder").axis == pytest.approx(axis, abs=1e-14)  # of π/2
-    assert ("<use_parent_model_frame> of a axis: is not read" in notes) == (version == "1.9")
+    assert ("<use_parent_model_frame> of an axis: is not read" in notes) == (version == "1.9")
 
 
 @pytest.mark.parametrize(

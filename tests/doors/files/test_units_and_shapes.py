@@ -85,7 +85,8 @@ def numbers(data):
 
 @pytest.mark.parametrize(("path", "text", "number"), VALUES, ids=[path for path, *_ in VALUES])
 def test_number_with_a_unit_is_the_number_in_si_to_the_last_digit(path, text, number):
-    """Factors with π may round once more. Scenes compare by numbers, so that files have them."""
+    """A scene with the text has the numbers of a scene with the SI number; factors with π may round once
+    more, by 2.3e-16."""
     read, right = (numbers(PRESS.with_(path, value).to_dict()) for value in (text, number))
     for mine, other in zip(read, right, strict=True):
         assert mine == other or math.isclose(mine, other, rel_tol=2.3e-16)

@@ -114,8 +114,9 @@ def test_every_method_follows_the_motion_through_its_events_as_the_judges_refere
 
 
 @pytest.mark.parametrize("t", [0.1, 0.2])
-def test_scene_at_a_sample_between_events_continues_the_motion(motion, t):
-    """A run from the sample on ends where the whole motion ends, to the tolerance of both (m)."""
+def test_scene_at_a_sample_continues_the_motion_through_its_later_events(motion, t):
+    """A run from the sample on ends where the whole motion ends, to the tolerance of both (m). At 0.2 s some
+    constraints begin or cease to hold."""
     rest = mbref.simulate(motion.scene_at(t), times=[0.0, 0.3 - t])
     assert np.abs(rest.position[-1] - motion.position[-1]).max() < 1e-9
 

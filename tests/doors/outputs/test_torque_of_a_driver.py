@@ -218,3 +218,4 @@ def test_driver_of_a_body_without_mass_has_no_torque_and_no_power():
     bare = [{key: body[key] for key in ("name", "position")} for body in bodies]
     found = moved(bare, joints).driver("A")
     assert found.torque is None and found.power is None
+    assert moved(bodies, joints).driver("A").torque is not None, "known with the masses"

@@ -86,20 +86,24 @@ def test_spreadsheet_with_decimal_commas_is_read_with_the_values_of_the_motion(m
     assert {"mass.acceleration.y", "A.angle", "A.force.x", "driver(A).torque"} <= set(recording.columns)
 
 
-def test_largest_reaction_of_a_crank_is_at_the_bottom(motion, tmp_path, capsys):
-    """m (ω² r + g) after three quarters of a turn. The driver's torque m g r is largest where the crank is
-    level, also in the moment at the anchor. The driver prescribes the motion, so that all is exact to
-    rounding."""
+def test_largest_reaction_of_a_crank_is_at_the_bottom(motion):
+    """m (ω² r + g) after three quarters of a turn. The largest moment at the anchor is the driver's torque
+    m g r, where the crank is level. The driver prescribes the motion, so that all is exact to rounding."""
     found = motion.reaction_maxima()["A"]
     assert found.force == pytest.approx(MASS * (RATE**2 * RADIUS + G), rel=1e-12)
     assert found.force_time == 0.75 and found.open == 0
     assert found.moment == pytest.approx(MASS * G * RADIUS, rel=1e-12)
     assert found.moment_time in (0.0, 0.5, 1.0)
+
+
+def test_command_prints_largest_reactions_and_their_times_in_the_requested_units(tmp_path, capsys):
+    """The crank's moment m g r in N mm, and its force m (ω² r + g) in N at 750 ms."""
     crank().save(tmp_path / "crank.toml")
     command = ["run", str(tmp_path / "crank.toml"), "--samples", "9", "--maxima", "--units", "N mm,mm,ms"]
     assert main(command) == 0
     shown = capsys.readouterr().out
-    assert f"{1000 * MASS * G * RADIUS:.6g}" in shown and f"{found.force:.6g} │  750 " in shown
+    force = MASS * (RATE**2 * RADIUS + G)
+    assert f"{1000 * MASS * G * RADIUS:.6g}" in shown and f"{force:.6g} │  750 " in shown
 
 
 def test_plot_over_the_angle_of_a_driver_has_the_columns_as_curves(motion):
