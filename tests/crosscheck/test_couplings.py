@@ -4,19 +4,13 @@ import numpy as np
 import pytest
 
 import mbref
-from crosscheck.conformance.initial_accelerations import PRINCIPLE, compare
-from crosscheck.conformance.mechanisms.geared import geared_mechanism
 from crosscheck.engine import Owner, Setting, engine
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.metrics import measure, violation_series
-from crosscheck.judge.model_identity import along
-from crosscheck.judge.reaction_balance import balance, idle
 from crosscheck.judge.reference.taylor import natural_motion
-from crosscheck.judge.reference.tree import tree_motion
 from crosscheck.judge.truth import truth_for
 from tests.helpers.coupled_mechanisms import EVERY, gear_pair, pendulum, planetary, spatial_chain
 
-TIMES = np.array([0.0, 0.2, 0.5, 0.8])
 CLOSED = 1e-7  # of the scene's length, after 1000 iterations of Bullet's solver a step
 ENGINES = 1e-8  # error (relative to the scene's length, or rad) of engines at fine settings
 TERMS = Setting("terms", {"rtol": 1e-11, "min_step": 1e-4})
@@ -30,22 +24,6 @@ FAMILIES = {"mujoco": "projected", "exudyn": "tuned"}  # whose finest settings a
 MODULES = {"drake": "pydrake", "dart": "dartpy", "pinocchio": "pinocchio", "simbody": "opensim"}
 LACKS = {"pinocchio": "coupling", "simbody": "armature", "bullet": "armature"}  # missing in the engines
 APART = 1e-13  # m or m/s; differences of two computations of one quantity by rounding
-every = pytest.mark.parametrize("make", EVERY, ids=lambda make: make.__name__)
-
-
-@every
-def test_mbref_moves_coupled_joints_as_the_reference(make):
-    """At a tolerance of 1e-12, relative errors of poses, reactions, energy and joints stay below 1e-11.
-    Accelerations solve the judge's equations (`along`); reactions balance every body and do no work, to
-    1e-12."""
-    scene = make().with_(duration=0.8)
-    motion = mbref.simulate(scene, times=TIMES, rtol=1e-12)
-    found = measure(scene, motion, truth_for(scene))
-    assert found["error"] <= 1e-11 and found["reaction_error"] <= 1e-11, found
-    assert max(violation_series(scene, motion, level).max() for level in range(3)) <= 1e-11
-    assert found["energy_error"] is None or found["energy_error"] <= 1e-11
-    assert along(scene, motion) is None
-    assert balance(scene, motion, motion) <= 1e-12 and idle(scene, motion, motion) <= 1e-12
 
 
 def test_run_with_another_gear_ratio_violates_the_coupling_by_its_slip():
@@ -71,7 +49,7 @@ def test_armatures_count_in_the_start_velocities_of_least_kinetic_energy():
     scene = spatial_chain()
     joints = [joint.model_copy(update={"armature": 0.0}) for joint in scene.joint]
     exact, bare = (
-        doubles(natural_motion(each, TIMES[:1], EXTENDED, seconds=60.0).velocity[0])
+        doubles(natural_motion(each, np.zeros(1), EXTENDED, seconds=60.0).velocity[0])
         for each in (scene, scene.with_(joint=joints))
     )
     assert np.abs(mbref.simulate(scene, times=[0.0]).velocity[0] - exact).max() < APART
@@ -140,22 +118,3 @@ def test_bullet_moves_coupled_joints_to_first_order(make):
         errors.append(found["error"])
         assert found["violation_position"] < CLOSED, found
     assert errors[0] / errors[1] == pytest.approx(2.0, abs=0.1), errors
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_start_accelerations_of_random_geared_mechanisms_agree(seed):
-    """The judge solves Gauss's principle by itself. Accelerations of mbref differ from its solution by 1e-13
-    over the least singular value of the rows, accelerations of MuJoCo with soft closures by 1e-7."""
-    scene = geared_mechanism(seed)
-    assert scene.coupling
-    found = compare(scene, ["mujoco"])
-    assert found.errors[PRINCIPLE] <= 1e-13 / found.distance and found.errors["mujoco"] <= 1e-7, found.errors
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_both_formulations_of_the_reference_agree_on_random_geared_mechanisms(seed):
-    """Poses after 2 ms agree to APART."""
-    scene = geared_mechanism(seed)
-    a, b = (motion(scene, [0.0, 0.002], EXTENDED, seconds=60.0) for motion in (natural_motion, tree_motion))
-    apart = np.abs(doubles(a.position - b.position)).max()
-    assert not a.reason and not b.reason and apart <= APART, (a.reason, b.reason, apart)

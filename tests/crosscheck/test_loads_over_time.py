@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -17,7 +16,7 @@ from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref.formats import ImportOptions
 from mbref.motions.trajectory import Outcome
-from mbref.scene import Factor, JointForce, JointTorque, Scene, SceneError, SlideSpring, TorsionSpring
+from mbref.scene import Factor, JointForce, JointTorque, Scene, SlideSpring, TorsionSpring
 from mbref.scenes import SCENES
 from tests.crosscheck.measured import MARGIN, ROUNDING
 from tests.helpers import loads_over_time as scenes
@@ -152,53 +151,19 @@ def test_adapter_refuses_a_function_of_time_that_it_does_not_map(of, kind):
     assert refused.owner is Owner.ADAPTER and "load[0]" in refused.reason
 
 
-MOTORS = """<mujoco><option timestep="0.001" integrator="RK4"/><worldbody>
+PLAIN = """<mujoco><option timestep="0.001" integrator="RK4"/><worldbody>
 <body name="arm" pos="0.3 0 0"><inertial mass="1.5" pos="0 0 0" diaginertia="0.02 0.05 0.06"/>
 <joint name="turn" type="hinge" axis="0 0 1" pos="-0.3 0 0" damping="0.1"/>
 <body name="head" pos="0.4 0.1 0"><inertial mass="0.5" pos="0 0 0" diaginertia="0.01 0.02 0.03"/>
 <joint name="slide" type="slide" axis="1 0.5 0" stiffness="40" damping="0.7" springref="0.05"/></body></body>
 </worldbody><actuator><motor name="m" joint="turn" gear="20"/>
 <general name="p" joint="slide" gainprm="3" gear="-2" ctrllimited="true" ctrlrange="-1 1"/>
-SERVO</actuator><keyframe><key name="on" ctrl="0.05 4SERVED"/></keyframe></mujoco>"""
-
-PLAIN = MOTORS.replace("SERVO", "").replace("SERVED", "")
+</actuator><keyframe><key name="on" ctrl="0.05 4"/></keyframe></mujoco>"""
 
 
 def read(tmp_path: Path, text: str, **options: object):
     (tmp_path / "model.xml").write_text(text)
     return FORMAT.read(tmp_path / "model.xml", ImportOptions(**options))
-
-
-def test_slide_springs_and_keyframe_motors_are_imported_as_loads(tmp_path):
-    """Torque = gear 20 · ctrl 0.05 = 1 N m. Force = gain 3 · gear -2 · ctrl 4, clipped to 1, = -6 N.
-    The scene moves as MuJoCo's RK4 with 500 steps of 1 ms moves the model, to 1e-9 m."""
-    scene = read(tmp_path, PLAIN, keyframe="on").scene
-    found = {load.type: load for load in scene.load}
-    assert found["slide_spring"].natural_displacement == 0.05 and found["slide_spring"].damping == 0.7
-    assert found["joint_torque"].torque == pytest.approx(1.0) and found["joint_force"].force == -6.0
-    model = mujoco.MjModel.from_xml_string(PLAIN)
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_step(model, data, 500)
-    mujoco.mj_forward(model, data)
-    exact = natural_motion(scene, np.array([0.0, 0.5]), EXTENDED)
-    assert np.abs(doubles(exact.position)[-1] - data.xipos[1:]).max() < 1e-9
-
-
-def test_motors_without_a_keyframe_are_no_loads(tmp_path):
-    """The scene has the spring and the damper of the joints, and no other load of the file."""
-    loads = read(tmp_path, PLAIN).scene.load
-    assert sorted(load.type for load in loads) == ["slide_spring", "torsion_spring"]
-
-
-def test_servo_with_a_force_range_is_refused_by_name_or_left_out(tmp_path):
-    """With ``--without motors`` the other motors of the file remain loads."""
-    servo = '<position name="s" joint="turn" kp="3" forcerange="-1 1"/>'
-    text = MOTORS.replace("SERVO", servo).replace("SERVED", " 0.2")
-    with pytest.raises(SceneError, match=r"'s', whose range of forces.*--without motors"):
-        read(tmp_path, text, keyframe="on")
-    left = read(tmp_path, text, keyframe="on", without=("motors",)).scene
-    assert left.load == read(tmp_path, PLAIN, keyframe="on").scene.load
 
 
 def test_joint_loads_return_from_exported_mjcf_with_their_motion(tmp_path):

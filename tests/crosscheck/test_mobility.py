@@ -1,35 +1,7 @@
-"""Rows, redundant rows and degrees of freedom / mbref's counts, and scenes worked out by hand."""
+"""Rows, redundant rows and degrees of freedom by the judge / scenes worked out by hand."""
 
-import pytest
-
-import mbref
 from crosscheck.judge.mobility import mobility
 from mbref.scene import GROUND, Body, Distance, Revolute, Scene
-from mbref.scenes import SCENES
-from tests.helpers.coupled_mechanisms import coupled_loops, gear_pair, pendulum, screw
-
-# names of built-in scenes with and without redundant rows
-NAMES = ("planar_slider_crank", "four_bar", "bennett", "sarrus", "five_bar_gravity", "andrews_squeezer")
-NAMES += ("four_bar_straight",)  # flat, where one more row is dependent
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_judge_s_rank_of_a_built_in_scene_gives_the_counts_of_mbref(name):
-    """Rows, redundant rows and degrees of freedom: the judge counts by singular values of its own constraint
-    matrix, mbref by elimination of its own rows."""
-    scene = SCENES[name]()
-    counts, found = mbref.counts(scene), mobility(scene)
-    assert found == (counts.rows, counts.redundant, counts.degrees_of_freedom)
-
-
-@pytest.mark.parametrize("make", [gear_pair, screw, pendulum, coupled_loops])
-def test_coupling_is_a_constraint_row_and_an_armature_is_none(make):
-    """The judge's count is mbref's without rotors, which are hidden bodies of six coordinates and rows."""
-    scene = make()
-    counts, found = mbref.counts(scene), mobility(scene)
-    rotors = sum(bool(joint.armature) for joint in scene.joint if hasattr(joint, "armature"))
-    assert found.degrees_of_freedom == counts.degrees_of_freedom and found.redundant == counts.redundant
-    assert found.rows == counts.rows - 6 * rotors
 
 
 def test_mobility_of_four_small_scenes_is_as_counted_by_hand():

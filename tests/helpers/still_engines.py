@@ -14,7 +14,7 @@ from crosscheck.engine import Cannot, Cost, Engine, Owner, Scene, Setting, Traje
 from mbref.scene import Body
 
 LONG = "words " * 1_700_000 + "end"  # a text of 10 MB
-FOR_A_MINUTE = [sys.executable, "-S", "-c", "import time; time.sleep(60)"]
+FOR_FIVE_MINUTES = [sys.executable, "-S", "-c", "import time; time.sleep(300)"]
 
 
 def resting(name: str = "resting") -> Scene:
@@ -61,13 +61,13 @@ class Logged(Still):
 
 
 class WithProgram(Still):
-    """Starts a program of a minute, appends both process numbers to a file, and returns or waits."""
+    """Starts a program of five minutes, appends both process numbers to a file, and returns or waits."""
 
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
 
     def act(self, scene: Scene) -> None:
-        started = subprocess.Popen(FOR_A_MINUTE)
+        started = subprocess.Popen(FOR_FIVE_MINUTES)
         with Path(os.environ["STILL_LOG"]).open("a") as log:
             log.write(f"{os.getpid()} {started.pid}\n")
         time.sleep(self.seconds)
@@ -94,4 +94,4 @@ class Refusing(Still):
 
 
 LOGGED, TALKATIVE, FAILING, REFUSING = Logged(), Talkative(), Failing(), Refusing()
-LEAVES_A_PROGRAM, WAITS_WITH_A_PROGRAM = WithProgram(0.0), WithProgram(60.0)
+LEAVES_A_PROGRAM, WAITS_WITH_A_PROGRAM = WithProgram(0.0), WithProgram(300.0)

@@ -164,14 +164,6 @@ def test_constant_value_is_not_animated():
     assert Timeline.of(np.array([1.0, 1.5])).animate("x", ["0", "0"]) == ""
 
 
-def test_animation_of_a_motion_without_samples_is_refused(turning):
-    scene, motion = turning
-    with pytest.raises(ValueError, match="has no sample"):
-        moving(scene, dataclasses.replace(motion, times=np.zeros(0)))
-    with pytest.raises(ValueError, match="has no sample"):
-        side_by_side(scene, {"a": motion, "b": dataclasses.replace(motion, times=np.zeros(0))}, "two")
-
-
 def test_animation_is_replaced_by_a_still_for_readers_who_prefer_reduced_motion(turning):
     """The style of the CSS media query prefers-reduced-motion hides the first group, which moves; the second
     group stands still. A still picture has no style."""

@@ -6,10 +6,9 @@ import pytest
 import mbref
 from mbref.scene import Factor, JointForce, Scene, SceneError
 from tests.helpers import loads_over_time as scenes
-from tests.helpers.loads_over_time import AXIS, CUBIC, WAVY
+from tests.helpers.loads_over_time import AXIS, WAVY
 
 METHODS = ("taylor", "alf-dual+projection/dop853", "lm1+none/adams")
-CLOSED_FORM = 1e-12  # relative to the largest value
 TIMES = np.linspace(0.0, 2.0, 17)
 
 
@@ -17,27 +16,6 @@ def run(scene: Scene, method: str, times=TIMES) -> mbref.Motion:
     motion = mbref.simulate(scene, method=method, times=times, rtol=1e-13)
     assert motion.outcome.name == "COMPLETED", motion.message
     return motion
-
-
-def error(found: np.ndarray, exact: np.ndarray) -> float:
-    """Return the largest difference over the largest exact value."""
-    return float(np.abs(found - exact).max() / np.abs(exact).max())
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_force_by_a_table_of_a_cubic_acts_between_its_times(method):
-    """The table has values of a cubic a(t), an acceleration (m/s²) from 0.5 s to 1.5 s: its spline is the
-    cubic. The body moves by ∬ a dt² and goes on at a constant speed after 1.5 s (`switched`)."""
-    moved = run(scenes.thrown(), method).position[:, 0] @ AXIS
-    assert error(moved, scenes.switched(TIMES)) <= CLOSED_FORM
-
-
-@pytest.mark.parametrize("method", ("taylor", "lm1+projection"))
-def test_driver_by_a_table_of_a_cubic_turns_by_the_cubic(method):
-    """The spline through a cubic's values is the cubic; the angular acceleration is its second derivative."""
-    motion = run(scenes.driven_wheel(), method)
-    assert error(motion.joint("J").angle, CUBIC(TIMES) - CUBIC(0.0)) <= CLOSED_FORM
-    assert error(motion.angular_acceleration[:, 0, 2], CUBIC.deriv(2)(TIMES)) <= CLOSED_FORM
 
 
 def test_acceleration_at_the_time_of_switching_is_the_one_afterwards():

@@ -101,11 +101,6 @@ def test_assembled_scene_has_no_offset_and_moves_as_the_scene_with_offset(make, 
     assert np.array_equal(motions[0].position, motions[1].position)
 
 
-def test_scene_without_offsets_is_its_own_assembly():
-    scene = gear_pair()
-    assert mbref.assembled(scene) is scene
-
-
 def test_offset_moves_the_wheel_that_is_not_driven():
     """A driver turns A by t; B is at 0.4 - 0.5 t."""
     scene = shifted(gear_pair, "teeth", 0.4).with_(driver=[{"joint": "A", "polynomial": [0.0, 1.0]}])

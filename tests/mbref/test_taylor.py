@@ -3,40 +3,11 @@
 import numpy as np
 import pytest
 
-from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
-from crosscheck.judge.reaction_balance import with_exact_reactions
 from crosscheck.judge.truth import truth_for
 from mbref.method import Method, MethodError
 from mbref.scene import Body, Driver, Revolute, Scene, Translational
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
-
-FIELDS = ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
-
-
-@pytest.mark.parametrize("seed", [0, 1, 2, 3, 4, 7, 21, 23, 24])
-def test_random_mechanism_moves_and_loads_its_joints_as_the_judge_s_reference(seed):
-    """Nine random mechanisms: poses, rates, accelerations, and all reactions that are unique, to 1e-7 of the
-    largest. Near singular positions accelerations magnify rtol, 1e-11."""
-    scene, times = random_mechanism(seed), np.linspace(0.0, 0.1, 4)
-    run = simulate(scene, "taylor", times, Limits(rtol=1e-11))
-    exact = with_exact_reactions(scene, truth_for(scene).poses(times))
-    assert run.outcome.name == "COMPLETED", run.message
-    for field in FIELDS:
-        true = getattr(exact, field)
-        assert np.abs(getattr(run, field) - true).max() <= 1e-7 * max(1.0, np.abs(true).max()), field
-    size = max(np.abs(true).max() for true in exact.reactions.values())
-    for name, marks in run.open_reactions.items():
-        if name in exact.reactions and not np.any(marks):
-            assert np.abs(run.reactions[name] - exact.reactions[name]).max() <= 1e-7 * size, name
-
-
-def test_number_of_samples_changes_neither_steps_nor_end():
-    """Runs with 2 and 41 samples end at one pose to the bit."""
-    scene = SCENES["planar_slider_crank"]()
-    few, many = (simulate(scene, "taylor", np.linspace(0, 0.05, k), Limits(rtol=1e-9)) for k in (2, 41))
-    assert few.cost.steps == many.cost.steps
-    assert np.array_equal(few.position[-1], many.position[-1])
 
 
 def test_taylor_named_as_the_integrator_of_alf_dual_in_old_records_is_the_method_taylor():

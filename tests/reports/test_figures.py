@@ -91,12 +91,6 @@ def test_powers_of_ten_at_the_axes_are_plain_text():
     assert {"10⁻⁷", "10⁰", "2×10⁰", "3×10⁰"} <= set(labels), labels
 
 
-def test_title_with_dollar_signs_is_shown_as_it_is():
-    figure, (axes,) = figures.canvas()
-    axes.set_title(r"$\frac$ {y}")  # no formula: matplotlib would refuse it
-    assert r">$\frac$ {y}</text>" in figures.svg(figure, "title")
-
-
 def test_figure_files_have_neither_date_nor_program():
     """A figure drawn again on another day, or by another version, is the same file."""
     figure, _ = figures.canvas(2.0, 2.0)

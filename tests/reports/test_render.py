@@ -64,12 +64,6 @@ def test_contents_of_the_page_lead_to_its_sections(written):
     assert targets and set(targets) <= ids, set(targets) - ids
 
 
-def test_markup_in_a_message_is_escaped(tmp_path):
-    render.write([Table("a < b", ("x",), [("<script>alert(1)</script>",)])], tmp_path)
-    page = (tmp_path / "index.html").read_text()
-    assert "&lt;script&gt;alert(1)" in page and "<script>alert" not in page
-
-
 def test_markdown_shows_eight_figures_as_png_and_svg(written):
     """Two scenes have four figures each."""
     text = (written / "report.md").read_text()

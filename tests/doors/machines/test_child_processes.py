@@ -36,9 +36,9 @@ sys.exit(rendered(sys.argv[1:]))
 WAITING = """
 import os, signal, subprocess, sys, time
 signal.signal(signal.SIGINT, signal.SIG_DFL)
-started = subprocess.Popen([sys.executable, "-S", "-c", "import time; time.sleep(60)"])
+started = subprocess.Popen([sys.executable, "-S", "-c", "import time; time.sleep(300)"])
 print(os.getpid(), started.pid, *sys.argv[1:], flush=True)
-time.sleep(60)
+time.sleep(300)
 """
 
 
