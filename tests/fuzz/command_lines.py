@@ -22,12 +22,19 @@ from tests.fuzz import mutations
 from tests.fuzz.broken_files import FILES, FOLDERS
 
 DOCUMENTED = (0, 1, 2, 130)  # exit statuses
-LEFT_OUT = {"--run", "--recheck"}  # options that measure for minutes, and change files of the package
+LEFT_OUT = {"--run", "--recheck", "--install"}  # options that measure for minutes, or change packages
+RARE = {"--page"}  # options that start a program of seconds; one in ten is used
+PLAUSIBLE = 2  # first numbers or words of a list, which a user may well give
 BY_ITSELF = dict.fromkeys(("draw", "animate", "plot", "modes"), "svg") | {"import": "toml"}  # outputs
 NUMBERS = (
-    *("0", "1", "2", "3", "-1", "0.01", "1e-9", "1e-300", "1e30", "1e308", "inf", "nan", "9" * 20),
+    *("1", "0.01", "0", "2", "3", "-1", "1e-9", "1e-300", "1e30", "1e308", "inf", "nan", "9" * 20),
     *("9" * 5000, "-0", "1_0", "٣", "0x10", "", "x", "1e", "--"),
 )
+ROBOTS = (".xml", ".urdf", ".sdf")
+INPUTS: dict[str, tuple[str, ...]] = {  # options and arguments of files → suffixes; without one, any
+    **dict.fromkeys(("scene", "old", "new", "render", "records", "baseline", "limits"), ()),
+    **{"file": ROBOTS, "robot": ROBOTS, "table": (".csv",)},
+}
 HOSTILE = (
     *("../../up", "/no/such/folder", "a/b", "$(touch pwned)", "`id`", "two words", "\x1b[31m", "\x9b2J"),
     *("<b>", "%s", "{0}", "$x_1$", "-", "--", "x" * 300, "ü", "\u202e", "[red]", "a\nb", "=", ":", ",", ".."),
@@ -55,6 +62,9 @@ WORDS = {  # values of an option or argument, by its name
     ),
     "times": ("0,0.001", "0.001", "0,0", "1,0", "-1", "nan", "0,1e300", ",", "1e-300,2e-300"),
     "columns": ("energy", "crank.position", "A.angle", "driver(A).torque", "x", "load(0).power", "time"),
+    "over": ("A.angle", "time", "x"),
+    "undriven": ("A", "B", "x"),
+    "units": ("mm,deg", "N mm", "furlong"),
     "column": ("time=1", "crank.position.x=2", "crank.position.x=2:mm", "a=b=c", "time=99", "time=0"),
     "unit": ("mm", "deg", "rpm", "furlong", "m"),
     "view": ("xy", "oblique", "10,20", "nan,1", "1e300,0", "1", "a,b"),
@@ -67,8 +77,8 @@ WORDS = {  # values of an option or argument, by its name
     "shell": ("bash", "zsh", "fish"),
     "like": ("four_bar", "x", "scene.toml"),
     "pose": ("a=0.1", "j1=nan", "x", "=", "a=1e300"),
-    "close": ("a=b", "a=b:revolute:y", "a", "=:", "a=a:ball:q"),
-    "hold": ("crank", "x"),
+    "close": ("base=rod", "a=b", "a=b:revolute:y", "a", "=:", "a=a:ball:q"),
+    "hold": ("rod", "crank", "x"),
     "without": ("armature,damping", "x", ","),
     "keyframe": ("0", "home", "9"),
 }
@@ -178,69 +188,70 @@ def _ended(chosen: Command, words: Sequence[str]) -> tuple[Any, str, str]:
 def _words(draw: random.Random, chosen: Command) -> list[str]:
     """Return the options and arguments of a command line, and write the files that it names."""
     words: list[str] = []
+    odd = draw.choice((0.0, 0.1, 0.5))  # share of strange values
     options = [action for action in chosen.actions if action.option_strings]
     usual = [action for action in options if draw.random() < (0.9 if action.required else 0.15)]
     for action in (*usual, *(action for action in chosen.actions if not action.option_strings)):
-        if LEFT_OUT & set(action.option_strings):
+        flags = set(action.option_strings)
+        if LEFT_OUT & flags or (RARE & flags and draw.random() < 0.9):
             continue
         flag = [draw.choice(action.option_strings)] if action.option_strings else []
-        words += [*flag, *_values(draw, chosen, action)]
+        words += [*flag, *_values(draw, chosen, action, odd)]
     short = {"--duration": "0.001", "--samples": "3", "--starts": "1", "--reference-time": "0.1"}
     there = {option for action in options for option in action.option_strings}
     for option, value in short.items():
         if option in there and option not in words and not (option == "--samples" and "--times" in words):
             words = [option, value, *words]
-    if draw.random() < 0.1 and words:
+    if draw.random() < 0.2 * odd and words:
         words[draw.randrange(len(words))] = draw.choice(PLAIN)
     return [word.replace("\x00", "") for word in words]
 
 
-def _values(draw: random.Random, chosen: Command, action: argparse.Action) -> list[str]:
+def _values(draw: random.Random, chosen: Command, action: argparse.Action, odd: float) -> list[str]:
     """Return the words of one option or argument."""
     if action.nargs == 0:
         return []
     counts = {"*": (0, 1, 1, 2), "+": (1, 1, 1, 2), "?": (0, 1)}
     count = draw.choice(counts.get(str(action.nargs), (1,)))
-    return [_value(draw, chosen, action) for _ in range(count)]
+    return [_value(draw, chosen, action, draw.random() < odd) for _ in range(count)]
 
 
-def _value(draw: random.Random, chosen: Command, action: argparse.Action) -> str:
-    kind, chance = action.type, draw.random()
-    if action.choices and chance < 0.9:
+def _value(draw: random.Random, chosen: Command, action: argparse.Action, strange: bool) -> str:
+    kind, hostile = action.type, strange and draw.random() < 0.15
+    if action.choices and not hostile:
         return str(draw.choice(sorted(action.choices)))
     if kind in (output_file, record_file, output_folder):
-        return _output(draw, chosen)
-    if action.dest in ("scene", "file", "table", "old", "new", "render", "records"):
-        return _input(draw, action.dest)
-    if action.dest in WORDS and chance < 0.85:
-        return draw.choice(WORDS[action.dest])
-    return draw.choice(NUMBERS if kind is not None and chance < 0.95 else HOSTILE)
+        return _output(draw, chosen, strange)
+    if action.dest in INPUTS:
+        return _input(draw, action.dest, strange)
+    known = WORDS.get(action.dest, NUMBERS if kind is not None else HOSTILE)
+    return draw.choice(HOSTILE if hostile else known if strange else known[:PLAUSIBLE])
 
 
-def _output(draw: random.Random, chosen: Command) -> str:
+def _output(draw: random.Random, chosen: Command, strange: bool) -> str:
     suffix = draw.choice(("toml", "csv", "svg", "json", "png", "xml", "jsonl", "gif", "md", ""))
     Path("kept.csv").write_text("my own\n")
     Path("full").mkdir(exist_ok=True)
     Path("full/mine.txt").write_text("my own\n")
-    strange = (
+    odd = (
         *("kept.csv", "full", "no/such/x.svg", "/dev/full", "/dev/null"),
         *("", "x" * 300, "..", "$(id).svg"),
     )
-    return draw.choice(strange) if draw.random() < 0.4 else f"new.{suffix}".rstrip(".")
+    return draw.choice(odd) if strange else f"new.{suffix}".rstrip(".")
 
 
-def _input(draw: random.Random, what: str) -> str:
+def _input(draw: random.Random, what: str, strange: bool) -> str:
     """Write a file or folder that is broken, or not, and return its path; or return a name."""
     if what == "scene" and draw.random() < 0.4:
         return draw.choice(SCENE_NAMES)
-    if what == "scene" and draw.random() < 0.6:
+    if what == "scene" and draw.random() < 0.9:
         Path("scene.toml").write_bytes(mutations.mutated_text(draw))
         return "scene.toml"
-    if draw.random() < 0.05:
+    if strange and draw.random() < 0.1:
         return draw.choice((*HOSTILE, "no_such.toml", ".", "/dev/null"))
     if what in ("old", "new", "render") or (what == "records" and draw.random() < 0.3):
         return FOLDERS.write(draw)
-    return FILES.write(draw, {"table": (".csv",), "file": (".xml", ".urdf", ".sdf")}.get(what, ()))
+    return FILES.write(draw, INPUTS[what])
 
 
 @contextlib.contextmanager

@@ -119,4 +119,4 @@ def _interrupted_after(seconds: float) -> Iterator[None]:
 
 
 def _interrupt(*_: object) -> None:
-    raise KeyboardInterrupt
+    signal.raise_signal(signal.SIGINT)  # a command may pass it on to a program that it runs
