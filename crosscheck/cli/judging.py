@@ -14,9 +14,10 @@ from rich.table import Table
 from crosscheck.cli import request, scene_request
 from crosscheck.cli.request import RequestError
 from crosscheck.cli.running import COMPLETED, OTHERWISE, console
+from crosscheck.judge.start import started
 from crosscheck.recorded.column_errors import ColumnError
 from crosscheck.recorded.columns import SI, kind_of
-from crosscheck.recorded.exact import reference_table, uncounted, write
+from crosscheck.recorded.exact import exact, reference_table, uncounted, write
 from crosscheck.recorded.judgement import Judgement, judge_motion
 from crosscheck.recorded.reading import read
 from crosscheck.recorded.search import SECONDS as SEARCHED
@@ -108,10 +109,8 @@ def write_reference(arguments: argparse.Namespace) -> int:
     times = request.sample_times(scene, arguments.times, arguments.samples)
     table = reference_table(scene, times, arguments.reference_time)
     if not len(table["time"]):
-        raise RequestError(
-            f"{scene.name}: no reference was found in {arguments.reference_time:g} CPU seconds; "
-            "raise --reference-time or shorten the motion"
-        )
+        reason = exact(started(scene), times, arguments.reference_time).reason
+        raise RequestError(f"{scene.name}: no reference was found: {reason}")
     write(table, Path(arguments.out))
     reached = float(table["time"][-1])
     console().print(

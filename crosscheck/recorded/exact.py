@@ -38,16 +38,18 @@ class Exact:
 
 
 def exact(scene: Scene, times: Sequence[float] | np.ndarray, seconds: float = SECONDS) -> Exact:
-    """Return the exact motion at increasing times (s): a closed form, or the reference computed within CPU
-    seconds."""
+    """Return the exact motion at increasing times (s): a closed form, or, without one after the start, the
+    reference computed within CPU seconds."""
     times = np.asarray(times, dtype=float)
     family, reason = closed_form(scene), ""
     if family is not None:
         try:
-            motion = family.poses(times)
+            motion: Trajectory | None = family.poses(times)
         except NoSolution as end:
-            motion, reason = family.poses(times[times <= end.until]), str(end)
-        return Exact(motion, np.full(len(motion.times), family.accuracy), reason)
+            known, reason = times[times <= end.until], str(end)
+            motion = family.poses(known) if known.max(initial=0.0) > 0 else None
+        if motion is not None:
+            return Exact(motion, np.full(len(motion.times), family.accuracy), reason)
     found = reference(scene, times.tolist(), seconds)
     part = found.part if isinstance(found, NoReference) else found
     return Exact(trajectory(scene, part), part.bound, getattr(found, "reason", ""))

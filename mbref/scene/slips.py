@@ -20,6 +20,8 @@ OTHER_UNIT = 300.0
 GYRATION = 30.0  # largest plausible radius of gyration / length of the mechanism
 STRONGEST = 100.0  # m/s²; largest plausible gravity
 FURTHEST = 100.0  # rad; largest plausible angle of a driver (16 turns; an angle in degrees is usually larger)
+DECIMALS = 3  # of an angle in degrees that a user writes
+ROUNDING = 1e-15  # relative error of an angle in degrees after the change to radians and back
 INSTANTS = 101  # number of times at which a driver's value is computed
 # distance of a point from a plane / size of the mechanism that counts as zero; also cosine of a right angle
 FLAT_MECHANISM = 1e-6
@@ -47,18 +49,28 @@ def link_lengths(scene: Scene) -> dict[str, dict[str, float]]:
 
 def _angles(scene: Scene) -> Iterator[str]:
     for i, load in enumerate(scene.load):
-        if load.type == "torsion_spring" and abs(load.natural_angle) > TURN:
+        if load.type == "torsion_spring" and _may_be_degrees(load.natural_angle):
             yield _degrees(f"load[{i}].natural_angle", load.natural_angle)
     for driver in scene.driver:
         path, sine = f"driver[{driver.joint}]", driver.sine
         turns = scene.joint_named(driver.joint).facts.driven == "angle"
-        if sine and abs(sine.phase) > TURN:
+        if sine and _may_be_degrees(sine.phase):
             yield _degrees(f"{path}.sine.phase", sine.phase)
-        if sine and turns and abs(sine.amplitude) > TURN:
+        if sine and turns and _may_be_degrees(sine.amplitude):
             yield _degrees(f"{path}.sine.amplitude", sine.amplitude)
         rate = driver.polynomial[1] if len(driver.polynomial) > 1 else 0.0
         if turns and rate and rate % QUARTER == 0:
             yield f"{path}.polynomial: {rate:g} rad/s is {rate / TURN:.3g} turns a second; is it in degrees?"
+
+
+def _may_be_degrees(angle: float) -> bool:
+    """Return whether an angle (rad) is more than a turn, and was not given with the unit deg or rev."""
+    return abs(angle) > TURN and not _is_round(math.degrees(angle))
+
+
+def _is_round(angle: float) -> bool:
+    """Return whether an angle (degrees) has few decimals."""
+    return abs(angle - round(angle, DECIMALS)) <= ROUNDING * abs(angle)
 
 
 def _degrees(path: str, angle: float) -> str:
@@ -161,7 +173,9 @@ def _far_drivers(scene: Scene) -> Iterator[str]:
     times = np.linspace(0.0, scene.duration, INSTANTS)
     for driver in scene.driver:
         furthest = float(np.abs(driver.values(times)).max())
-        if scene.joint_named(driver.joint).facts.driven == "angle" and furthest > FURTHEST:
+        has_unit = any(driver.polynomial) and all(_is_round(math.degrees(c)) for c in driver.polynomial)
+        turns = scene.joint_named(driver.joint).facts.driven == "angle"
+        if turns and furthest > FURTHEST and not has_unit:
             yield (
                 f"driver[{driver.joint}].polynomial: turns the joint by {furthest:.4g} rad, "
                 f"{furthest / TURN:.3g} turns, within {scene.duration:g} s; is it in degrees?"

@@ -129,7 +129,8 @@ def commands() -> tuple[Command, ...]:
 def command_line(seed: int) -> str:
     """Run one command line; return its command and how it ended."""
     draw = random.Random(seed)
-    chosen = draw.choice(commands())
+    weights = [len(command.actions) for command in commands()]
+    (chosen,) = draw.choices(commands(), weights)
     place = Path(tempfile.mkdtemp(prefix="case", dir="."))
     outside, before = _entries(Path()), Path.cwd()
     os.chdir(place)

@@ -4,6 +4,7 @@ numbers."""
 import json
 import math
 import signal
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from pathlib import Path
@@ -157,6 +158,14 @@ def test_killed_process_loses_only_the_call_that_killed_it(tmp_path: Path):
         errors = [type(call.exception()).__name__ for call in calls]
     assert errors == ["NoneType"] * 2 + ["BrokenProcessPool"] + ["NoneType"] * 5
     assert [call.result() for call in calls if call.exception() is None] == [2**k for k in range(8) if k != 2]
+
+
+def test_interrupt_ends_calls_of_processes_that_still_run():
+    """The call would sleep for a day; without the interrupt's effect on it, this test does not end."""
+    with pytest.raises(KeyboardInterrupt), processes(1) as pool:
+        call = pool.submit(time.sleep, 86400.0)
+        raise KeyboardInterrupt
+    assert call.cancelled() or isinstance(call.exception(), BrokenExecutor)
 
 
 def _arguments(k: int) -> tuple:

@@ -168,9 +168,9 @@ def test_hinge_axis_is_no_slip_without_a_plane_that_most_hinges_are_normal_to(sc
     assert probable_slips(scene) == []
 
 
-@pytest.mark.parametrize(("rate", "slips"), [(100.1, 1), (99.9, 0), (-100.1, 1)])
+@pytest.mark.parametrize(("rate", "slips"), [(100.1, 1), (99.9, 0), (-100.1, 1), ("6000 deg", 0)])
 def test_driver_that_turns_more_than_a_hundred_radians_is_a_probable_slip(rate, slips):
-    """In 1 s at a rate (rad/s)."""
+    """In 1 s at a rate (rad/s, or with the unit degrees)."""
     driven = find_scene("four_bar").with_(driver=({"joint": "A", "polynomial": [0.0, rate]},), duration=1.0)
     beginning = "driver[A].polynomial: turns the joint by 100.1 rad, 15.9 turns"
     assert [slip[: len(beginning)] for slip in probable_slips(driven)] == [beginning] * slips
@@ -220,6 +220,7 @@ def test_angle_beyond_a_turn_is_a_probable_slip_of_degrees():
     """The natural angle of the example's spring, in rad and in degrees."""
     scene = Scene.from_file(Path(__file__).parents[2] / "examples" / "door_closer.toml")
     assert probable_slips(scene) == []
+    assert probable_slips(scene.with_("load[0].natural_angle", "-800 deg")) == []
     assert probable_slips(scene.with_("load[0].natural_angle", -69.0)) == [
         "load[0].natural_angle: -69 rad is more than a turn; is it in degrees?"
     ]

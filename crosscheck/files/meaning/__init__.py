@@ -6,7 +6,9 @@ compiler, so that MuJoCo's compiled model is the meaning of an MJCF file.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from crosscheck.engines.loaders.loader import MJCF, SDF, URDF
 from crosscheck.engines.loaders.machine import Machine
@@ -14,6 +16,7 @@ from crosscheck.engines.loaders.mujoco import Mujoco
 from crosscheck.engines.shared import xml_files
 from crosscheck.files.meaning import sdf, urdf
 from mbref.scene import SceneError
+from mbref.scene.fields import LARGEST
 
 FORMS = {"mujoco": MJCF, "mujocoinclude": MJCF, "robot": URDF, "sdf": SDF}
 SOURCES = {
@@ -34,6 +37,31 @@ def form_of(path: Path) -> str:
 
 def meant(path: Path, form: str) -> Machine:
     """Return the machine that a file means; raises SceneError for a faulty file, OSError."""
+    machine = _meant(path, form)
+    if faults := list(_too_large(machine)):
+        raise SceneError([f"{path}: {fault}" for fault in faults])
+    return machine
+
+
+def _too_large(machine: Machine) -> Iterator[str]:
+    """Yield numbers whose products exceed floating-point numbers; a limit of a joint multiplies nothing."""
+    for part in (*machine.bodies, *machine.joints, *(machine.loops or ()), *(machine.couplings or ())):
+        for name, value in vars(part).items():
+            largest = max(_sizes(value), default=0.0)
+            if largest > LARGEST and name not in ("lower", "upper"):
+                yield f"{part.name}: {name} must be at most {LARGEST:g} in size, got {largest:g}"
+
+
+def _sizes(value: Any) -> Iterator[float]:
+    """Yield the sizes of the numbers in nested tuples."""
+    if isinstance(value, tuple):
+        for entry in value:
+            yield from _sizes(entry)
+    elif isinstance(value, float):
+        yield abs(value)
+
+
+def _meant(path: Path, form: str) -> Machine:
     if form == MJCF:
         try:
             return Mujoco().load(path, form).machine()

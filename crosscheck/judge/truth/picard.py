@@ -73,8 +73,8 @@ class Solution:
         return np.einsum("kn,knm->km", _cardinal(x), values[panel])
 
     def reach(self, is_enough: Callable[[np.ndarray], bool]) -> np.ndarray:
-        """Return the state (m,) at the end of the first panel after which ``is_enough`` is true."""
-        self._panels(lambda: not is_enough(self._state))
+        """Return the state (m,) at the start or the end of the first panel at which ``is_enough`` is true."""
+        self._extend(lambda: not is_enough(self._state))
         return self._state
 
     def where(self, component: int, wanted: np.ndarray) -> np.ndarray:
@@ -94,19 +94,23 @@ class Solution:
         return self(np.clip(at, 0, edges[-1]))
 
     def _panels(self, is_short: Callable[[], bool]) -> tuple[np.ndarray, np.ndarray]:
-        """Return edges (p + 1,) and values (p, NODES, m) of the panels; panels are added while ``is_short``
-        is true."""
+        """Return edges (p + 1,) and values (p, NODES, m) of at least one panel; panels are added while
+        ``is_short`` is true."""
+        self._extend(lambda: not self._values or is_short())
+        return np.array(self._edges), np.stack(self._values)
+
+    def _extend(self, is_short: Callable[[], bool]) -> None:
+        """Add panels while ``is_short`` is true."""
         with self._asked:
             began = time.thread_time()
             try:
                 with within(SECONDS - self._spent):
-                    while not self._values or is_short():
+                    while is_short():
                         self._add_panel()
             except TimeIsUp as end:
                 raise NoSolution.ending(str(end), float(self._edges[-1])) from None
             finally:
                 self._spent += time.thread_time() - began
-            return np.array(self._edges), np.stack(self._values)
 
     def _add_panel(self) -> None:
         while True:
