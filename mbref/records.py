@@ -22,6 +22,8 @@ from mbref.input_error import InputError
 
 COMPRESSED = b"\xfd7zXZ\x00"  # first bytes of a compressed file
 
+# errors of reading an object from a record in which a field is missing or has a value of another type
+BROKEN = (ValueError, KeyError, TypeError, AttributeError, OverflowError)
 INFINITE_MARKS = {math.inf: "\ue000+", -math.inf: "\ue000-"}  # placeholders until the text is made
 NO_MARKS: Mapping[float, str] = {}
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from crosscheck.conformance.agreeing import differences, off_from_gauss, runs_of, way_of
 from crosscheck.conformance.mechanisms.large_graphs import MOST, large_graph
@@ -35,12 +35,37 @@ DIGITS = 3  # of stored numbers
 BATCH = 25  # mechanisms after which the file is written
 
 
-class Shape(BaseModel):
-    """Record of an engine on a mechanism.
+def _pair(row: list[Any]) -> list[Any]:
+    """Return the row if it has two ways, a size, a quantity and a body; raises ValueError for another one."""
+    if len(row) != 5 or type(row[2]) is not float or {type(row[k]) for k in (0, 1, 3, 4)} != {str}:
+        raise ValueError("must be two ways, a number, a quantity and a body")
+    return row
 
-    A group has the limit ``within``, and by way: how it ``ended``, CPU ``seconds``, and how far it is ``off``
-    from Gauss's principle at the start. ``pairs`` have the worst difference, its quantity and its body.
-    """
+
+class Group(BaseModel):
+    """Ways that solve the same equations: the limit ``within`` which they agree, and by way how it ``ended``,
+    CPU ``seconds``, and how far it is ``off`` from Gauss's principle at the start. ``pairs`` have the worst
+    difference, its quantity and its body."""
+
+    model_config = ConfigDict(strict=True)
+
+    within: Annotated[float, Field(gt=0.0)]
+    ended: dict[str, str]
+    seconds: dict[str, float]
+    off: dict[str, float]
+    pairs: list[Annotated[list[Any], AfterValidator(_pair)]]
+
+    @model_validator(mode="after")
+    def _has_the_time_of_each_way(self) -> Group:
+        if not self.ended.keys() <= self.seconds.keys():
+            raise ValueError("seconds are required of each way")
+        return self
+
+
+class Shape(BaseModel):
+    """Record of an engine on a mechanism."""
+
+    model_config = ConfigDict(strict=True)
 
     key: str
     engine: str
@@ -51,7 +76,7 @@ class Shape(BaseModel):
     clearance: float
     redundant: int
     refused: str
-    groups: list[dict[str, Any]]
+    groups: list[Group]
 
 
 def read(path: Path = FILE) -> list[Record]:

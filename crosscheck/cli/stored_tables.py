@@ -44,7 +44,7 @@ def closed_loops(arguments: argparse.Namespace) -> int:
         _measure(arguments, path)
     if status := write_page("closed-loops", path, arguments.page):
         return status
-    found = read_runs(path)
+    found = _some(read_runs(path), path)
     cells = matrix(found)
     for is_best in (True, False):
         console().print(_errors(cells, is_best))
@@ -91,7 +91,7 @@ def convergence(arguments: argparse.Namespace) -> int:
     if arguments.every_scene:
         console().print(_of_scenes())
         return COMPLETED
-    runs = read_runs(path)
+    runs = _some(read_runs(path), path)
     rows = orders.table(runs)
     console().print(_orders(rows))
     _name_left_out(runs, [r for row in rows.values() for cell in row.values() for r in cell])
@@ -115,6 +115,13 @@ def _of_scenes() -> Table:
     return table
 
 
+def _some(records: list[Record], path: Path) -> list[Record]:
+    """Return the records of a file; raises RequestError if there are none."""
+    if not records:
+        raise request.RequestError(f"{path}: has no records; --run measures engines and writes them")
+    return records
+
+
 def _name_left_out(records: Sequence[Record], shown: Sequence[Record]) -> None:
     """Print which records belong to no row and column of a table."""
     keys = {record["key"] for record in shown}
@@ -130,7 +137,7 @@ def invariants(arguments: argparse.Namespace) -> int:
         kept.measure(request.find_engines(arguments.engine or ["all"], notice), path, notice)
     if status := write_page("invariants", path, arguments.page):
         return status
-    runs = kept.read(path)
+    runs = _some(kept.read(path), path)
     known = {column.experiment for column in laws.COLUMNS}
     _name_left_out(runs, [record for record in runs if record["experiment"] in known])
     for title, found in laws.tables(runs).items():
@@ -150,7 +157,7 @@ def alternatives(arguments: argparse.Namespace) -> int:
         agreeing.measure(engines, path, arguments.mechanisms, notice)
     if status := write_page("alternatives", path, arguments.page):
         return status
-    found = of_alternatives.engines(agreeing.read(path))
+    found = of_alternatives.engines(_some(agreeing.read(path), path))
     table = Table(*of_alternatives.HEADER, title="ways to solve the same equations", box=SIMPLE)
     for records in found.values():
         table.add_row(*of_alternatives.line(records))

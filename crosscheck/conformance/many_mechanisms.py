@@ -22,6 +22,7 @@ from crosscheck.conformance.runners import InProcess
 from crosscheck.conformance.suite import CANNOT, FAIL, PASS, REFUSAL, RUN, Verdict
 from crosscheck.conformance.trial import Bench, Broken, difference, set_up
 from crosscheck.engine import engine
+from crosscheck.study.record_shape import OfSeed, checked
 from mbref.records import append, opened
 from mbref.scene import Scene
 
@@ -104,7 +105,7 @@ class Tally:
             self.counts.setdefault(check, Counter())[verdict["status"]] += 1
             if verdict["status"] == FAIL:
                 self.violations.append(verdict)
-            elif verdict["measured"] and verdict["allowed"]:
+            elif verdict.get("measured") and verdict.get("allowed"):
                 part = verdict["measured"] / verdict["allowed"]
                 self.worst[check] = max(self.worst.get(check, (0.0, "")), (part, verdict["scene"]))
 
@@ -148,6 +149,7 @@ def examined(plan: Plan, path: str | None = None, progress: Callable[[str], None
     new checks are added to them.
     """
     known, tally = opened(path), Tally(plan)
+    checked(path, list(known.values()), OfSeed)
     for seed in itertools.islice(itertools.count(plan.first), MOST * plan.mechanisms):
         wanted = tally.open()
         if not wanted:

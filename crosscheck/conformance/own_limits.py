@@ -18,14 +18,15 @@ An expected failure is strict: if the check passes on such a scene, it fails unt
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 from crosscheck.conformance.suite import EXPECTED, FAIL, PASS, Verdict, abouts
+from crosscheck.study.record_shape import Verdicts, checked
+from mbref.records import RecordsError, json_content
 from mbref.scene import SceneError
 from mbref.scene.fields import meant
 from mbref.scene.toml import read_toml
@@ -135,14 +136,15 @@ def _faults(table: str, entry: Any, scenes: Collection[str]) -> list[str]:
 
 
 def read_baseline(path: str | Path) -> dict[Key, Verdict]:
-    """Return the verdicts that ``verify --json`` printed, by check and scene; raises SceneError for another
-    file."""
-    try:
-        data = json.loads(Path(path).read_text(encoding="utf-8"))
-        records = [{k: v for k, v in each.items() if k != "card"} for each in data["verdicts"]]
-        verdicts = [Verdict(**record) for record in records]
-    except OSError as error:
-        raise SceneError([f"{path}: cannot be read: {error.strerror}"]) from None
-    except (ValueError, KeyError, TypeError, AttributeError):
-        raise SceneError([f"{path}: is not a file that crosscheck verify --json printed"]) from None
-    return {(verdict.property, verdict.scene): verdict for verdict in verdicts}
+    """Return the verdicts that ``verify --json`` printed, by check and scene; raises RecordsError for another
+    file, OSError."""
+    data, names = json_content(path), [each.name for each in fields(Verdict)]
+    if not isinstance(data, dict) or "verdicts" not in data:
+        raise RecordsError(f"{path}: is not a file that crosscheck verify --json printed")
+    checked(path, [data], Verdicts)
+    verdicts = [Verdict(**{k: v for k, v in each.items() if k in names}) for each in data["verdicts"]]
+    found = {(verdict.property, verdict.scene): verdict for verdict in verdicts}
+    for verdict in verdicts:
+        if found[verdict.property, verdict.scene] != verdict:
+            raise RecordsError(f"{path}: has two verdicts on {verdict.property} of {verdict.scene!r}")
+    return found

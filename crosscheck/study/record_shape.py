@@ -253,9 +253,10 @@ class _Outcome(_Shape):
     property: str
     card: str
     scene: str
-    status: str
+    status: Literal["pass", "fail", "cannot", "outside", "expected"]
     measured: float | None = None
     allowed: float | None = None
+    reason: str = ""
 
 
 class Verdicts(_Shape):
@@ -267,6 +268,15 @@ class Verdicts(_Shape):
     verdicts: list[_Outcome] = []
     violations: list[_Outcome] = []
     cards: dict[str, dict[str, Any]] = {}
+
+
+class OfSeed(_Shape):
+    """Record of the verdicts on the random mechanisms of a seed (`conformance.many_mechanisms`)."""
+
+    key: str
+    version: str
+    verdicts: list[_Outcome]
+    asked: list[str] = []
 
 
 def checked(

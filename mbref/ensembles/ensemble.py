@@ -17,7 +17,7 @@ from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import asdict
 from pathlib import Path
 from queue import SimpleQueue
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -100,7 +100,7 @@ def ensemble(
         for place, scene in enumerate(scenes):
             key = _key(scene, times, method, limits) if path else ""
             if key in known:
-                yield place, Trajectory.from_record(scene.name, known[key])
+                yield place, _stored(path, scene, known[key])
                 continue
             work.add(Job(place, key, scene))
             while work.is_full() or work.has_ended():
@@ -110,6 +110,17 @@ def ensemble(
             yield from _handed_out(work, path)
     finally:
         work.cancel()
+
+
+def _stored(path: str | Path | None, scene: Scene, record: dict[str, Any]) -> Trajectory:
+    """Return the motion of a record; raises RecordsError if it is damaged."""
+    try:
+        return Trajectory.from_record(scene.name, record)
+    except records.BROKEN:
+        key = record["key"][:12]
+        raise records.RecordsError(
+            f"{path}: record {key!r}: is no result of a run; remove this line, or the file"
+        ) from None
 
 
 class Job(NamedTuple):

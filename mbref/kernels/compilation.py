@@ -235,17 +235,15 @@ def prepare_all(kernels: Sequence[Exchangeable], method: str = "") -> None:
     Kernels that another process compiles come last, so that processes with different orders share the work.
     """
     elsewhere, before = [], _method.set(method)
-    try:
-        with garbage_kept():
-            for each in kernels:
-                if each.is_compiled_elsewhere:
-                    elsewhere.append(each)
-                else:
-                    each.prepare()
-            for each in elsewhere:
+    with garbage_kept():
+        for each in kernels:
+            if each.is_compiled_elsewhere:
+                elsewhere.append(each)
+            else:
                 each.prepare()
-    finally:
-        _method.reset(before)
+        for each in elsewhere:
+            each.prepare()
+    _method.reset(before)
 
 
 def pair_of(first: types.Type, second: types.Type) -> types.Type:

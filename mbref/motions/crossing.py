@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from mbref.motions.record_fields import typed
+
 
 @dataclass(frozen=True, eq=False)
 class Crossing:
@@ -91,4 +93,4 @@ class Crossing:
             The crossing, with arrays as attributes.
         """
         arrays = {key: np.array(v, dtype=float) for key, v in record.items() if isinstance(v, list)}
-        return Crossing(**{**record, **arrays})
+        return typed(Crossing(**{**record, **arrays}))

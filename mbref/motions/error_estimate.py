@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mbref import rotations
+from mbref.motions.record_fields import typed
 from mbref.motions.trajectory import Trajectory
 
 # error / relative tolerance, and error: a warning is given if both are exceeded
@@ -159,12 +160,13 @@ class ErrorEstimate:
             Result of ``to_record``.
         """
         tighter = record["tighter"]
-        return ErrorEstimate(
+        found = ErrorEstimate(
             times,
-            np.array(record["error"], dtype=float),
+            np.array(record["error"], dtype=float).reshape(len(times)),
             **{key: record[key] for key in ("rtol", "second_run", "reason")},
             tighter=None if tighter is None else (float(tighter[0]), float(tighter[1])),
         )
+        return typed(found)
 
 
 def distances(

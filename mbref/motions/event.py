@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from mbref.motions.record_fields import typed
+
 STATE_BEFORE = ("position", "orientation", "velocity", "angular_velocity")
 EVENT_STATES = (*STATE_BEFORE, "velocity_after", "angular_velocity_after")
 
@@ -105,4 +107,4 @@ class Event:
         arrays = {key: np.array(record[key], dtype=float) for key in EVENT_STATES}
         impulses = {name: np.array(wrench, dtype=float) for name, wrench in record["impulses"].items()}
         names = {key: tuple(record[key]) for key in ("engaged", "released")}
-        return Event(**{**record, **arrays, **names, "impulses": impulses})
+        return typed(Event(**{**record, **arrays, **names, "impulses": impulses}))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from mbref.files import replaced, write
 from mbref.input_error import InputError
 from mbref.motions.error_estimate import ErrorEstimate
 from mbref.motions.trajectory import Trajectory
-from mbref.records import strict_json
+from mbref.records import BROKEN, json_content, strict_json
 from mbref.scene import Scene, SceneError
 
 
@@ -29,11 +28,11 @@ def write_json(path: str | Path, scene: Scene, record: Mapping[str, Any]) -> Non
 def read_json(path: str | Path) -> tuple[Scene, Trajectory, ErrorEstimate | None]:
     """Return what ``write_json`` wrote; raises InputError for another file, OSError."""
     try:
-        whole = json.loads(Path(path).read_text(encoding="utf-8"))
+        whole = json_content(path)
         scene, record = Scene(**whole["scene"]), whole["record"]
         trajectory, estimate = Trajectory.from_record(scene.name, record), record.get("error_estimate")
         return scene, trajectory, ErrorEstimate.from_record(trajectory.times, estimate) if estimate else None
-    except (ValueError, KeyError, TypeError, AttributeError, SceneError):
+    except (*BROKEN, SceneError):
         raise InputError(f"{path}: is not a file that Motion.save wrote") from None
 
 

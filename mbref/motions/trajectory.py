@@ -11,6 +11,7 @@ import numpy as np
 
 from mbref.motions.crossing import Crossing
 from mbref.motions.event import Event
+from mbref.motions.record_fields import typed
 
 
 class Outcome(enum.Enum):
@@ -289,6 +290,11 @@ class Trajectory:
         -------
         Trajectory
             The trajectory, with arrays as attributes.
+
+        Raises
+        ------
+        ValueError, KeyError, TypeError, AttributeError, OverflowError
+            For another record; ``mbref.records.BROKEN`` are these types.
         """
         names, k = tuple(record["bodies"]), len(record["times"])
         crossings, events = record.get("crossings"), record.get("events")
@@ -302,8 +308,11 @@ class Trajectory:
             given = all(record["bodies"][name].get(key) is not None for name in names)
             return stacked(key, 3) if given else None
 
+        def rows(lists: Mapping[str, Any], kind: type) -> dict[str, np.ndarray]:
+            return {name: np.array(values, dtype=kind).reshape(k) for name, values in lists.items()}
+
         reactions = {n: np.array(v, dtype=float).reshape(k, 6) for n, v in record["reactions"].items()}
-        return Trajectory(
+        found = Trajectory(
             scene=scene,
             **{key: record[key] for key in ("engine", "version", "method", "settings", "message", "t_end")},
             times=np.array(record["times"], dtype=float),
@@ -315,13 +324,14 @@ class Trajectory:
             acceleration=optional("acceleration"),
             angular_acceleration=optional("angular_acceleration"),
             reactions=reactions or None,
-            open_reactions=None if marks is None else {n: np.array(v, dtype=int) for n, v in marks.items()},
-            angles=None if angles is None else {n: np.array(v, dtype=float) for n, v in angles.items()},
+            open_reactions=None if marks is None else rows(marks, int),
+            angles=None if angles is None else rows(angles, float),
             outcome=Outcome[record["outcome"]],
-            cost=Cost(**record["cost"]),
+            cost=typed(Cost(**record["cost"])),
             crossings=None if crossings is None else tuple(Crossing.from_record(c) for c in crossings),
             events=None if events is None else tuple(map(Event.from_record, events)),
         )
+        return typed(found)
 
 
 def _lists(arrays: Mapping[str, np.ndarray]) -> dict[str, list[Any]]:

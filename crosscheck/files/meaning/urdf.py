@@ -27,6 +27,7 @@ from crosscheck.engines.loaders.machine import (
 )
 from crosscheck.engines.loaders.placing import ORIGIN, Place, of_rpy
 from mbref.scene import SceneError
+from mbref.scene.fields import LARGEST
 
 TYPES = {
     "revolute": REVOLUTE,
@@ -94,6 +95,8 @@ def _numbers(element: ET.Element | None, key: str, default: tuple[float, ...]) -
         found = np.zeros(0)
     if found.shape != (len(default),) or not np.isfinite(found).all():
         raise SceneError([f"<{element.tag if element is not None else ''} {key}={text!r}>: must be numbers"])
+    if element is not None and element.tag != "limit" and np.abs(found).max() > LARGEST:
+        raise SceneError([f"<{element.tag} {key}={text!r}>: must be at most {LARGEST:g} in size"])
     return found
 
 

@@ -29,6 +29,17 @@ def test_import_of_a_file_that_mujoco_warns_about_leaves_no_log(text, status, tm
 
 
 @pytest.mark.slow
+def test_files_of_a_model_that_mujoco_warns_about_leaves_no_log(tmp_path, monkeypatch):
+    """The armature cancels the inertia, 1 + 1 · 1² kg m² about the hinge."""
+    file = tmp_path / "a.xml"
+    file.write_text(NOT_A_NUMBER.replace("0 nan 0", "0 1 0").replace("<joint", '<joint armature="-2"'))
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    assert crosscheck(["files", str(file), "--engine", "mujoco", "--no-advice"]) == 0
+    assert not os.listdir()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["four_bar", "four_bar_gravity"])
 def test_runs_and_modes_of_engines_leave_no_file(scene, tmp_path, monkeypatch):
     """The commands do run, and are not refused with status 2: Exudyn's defaults end early on these scenes,

@@ -12,6 +12,7 @@ from crosscheck.conformance.junit import junit
 from crosscheck.conformance.mechanisms.specimens import specimens
 from crosscheck.conformance.own_limits import OwnLimits, read_baseline, read_limits
 from crosscheck.conformance.runners import InProcess
+from mbref.records import RecordsError
 from mbref.scene import SceneError
 from tests.helpers.low_order_engines import low_order, midpoint
 
@@ -74,7 +75,8 @@ def test_own_limit_replaces_the_limit_of_a_check_on_its_scenes(right, wrong, tmp
 
 def test_failure_no_worse_than_in_the_baseline_does_not_count(right, wrong, tmp_path):
     """The record of the faulty engine excuses it; a value of three times as much, and the record of the right
-    engine do not. A file of another form is refused."""
+    engine do not. A file of another form, with a text for a number, or with
+    contradicting verdicts is refused."""
     for name, found in (("wrong", wrong), ("right", right)):
         (tmp_path / f"{name}.json").write_text(json.dumps(found.to_record()))
     before = OwnLimits(baseline=read_baseline(tmp_path / "wrong.json"))
@@ -84,9 +86,15 @@ def test_failure_no_worse_than_in_the_baseline_does_not_count(right, wrong, tmp_
     passed = OwnLimits(baseline=read_baseline(tmp_path / "right.json"))
     known = [v for v in failed(wrong) if v.property != "run"]
     assert known and all("passes in the baseline" in passed.judged(v).reason for v in known)
-    with pytest.raises(SceneError, match="is not a file that crosscheck verify --json printed"):
-        (tmp_path / "wrong.json").write_text("{}")
-        read_baseline(tmp_path / "wrong.json")
+    whole = wrong.to_record()
+    for damaged, said in [
+        ({}, "is not a file that crosscheck verify --json printed"),
+        (whole | {"verdicts": [whole["verdicts"][0] | {"measured": "1"}]}, "verdicts.0.measured: "),
+        (whole | {"verdicts": [whole["verdicts"][0] | {"status": s} for s in ("pass", "fail")]}, "has two"),
+    ]:
+        (tmp_path / "wrong.json").write_text(json.dumps(damaged))
+        with pytest.raises(RecordsError, match=said):
+            read_baseline(tmp_path / "wrong.json")
 
 
 def test_scenes_after_the_time_budget_are_named_and_conform_to_nothing():
