@@ -130,14 +130,14 @@ class Session:
 def _limits(config: pytest.Config, scenes: Collection[str]) -> OwnLimits:
     """Return the limits of the engine's author; raises pytest.UsageError for a faulty file."""
     from crosscheck.conformance.own_limits import OwnLimits, read_baseline, read_limits
-    from mbref.input_error import InputError
+    from mbref.records import RecordsError
     from mbref.scene import SceneError
 
     limits, baseline = config.getoption("limits"), config.getoption("baseline")
     try:
         found = read_limits(limits, scenes) if limits else OwnLimits()
         return replace(found, baseline=read_baseline(baseline)) if baseline else found
-    except (SceneError, InputError, OSError) as error:
+    except (SceneError, RecordsError, OSError) as error:
         raise pytest.UsageError(str(error)) from error
 
 

@@ -31,6 +31,10 @@ def read_json(path: str | Path) -> tuple[Scene, Trajectory, ErrorEstimate | None
         whole = json_content(path)
         scene, record = Scene(**whole["scene"]), whole["record"]
         trajectory, estimate = Trajectory.from_record(scene.name, record), record.get("error_estimate")
+        if trajectory.bodies != tuple(body.name for body in scene.body):
+            raise ValueError("has states of other bodies")
+        if not {*(trajectory.angles or ())} <= {joint.name for joint in scene.joint}:
+            raise ValueError("has angles of other joints")
         return scene, trajectory, ErrorEstimate.from_record(trajectory.times, estimate) if estimate else None
     except (*BROKEN, SceneError):
         raise InputError(f"{path}: is not a file that Motion.save wrote") from None

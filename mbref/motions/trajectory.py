@@ -11,7 +11,7 @@ import numpy as np
 
 from mbref.motions.crossing import Crossing
 from mbref.motions.event import Event
-from mbref.motions.record_fields import typed
+from mbref.motions.record_fields import arrays, typed
 
 
 class Outcome(enum.Enum):
@@ -284,21 +284,15 @@ class Trajectory:
         scene : str
             Name of the scene, which the record does not contain.
         record : mapping
-            Result of ``to_record``.
+            Result of ``to_record``; another mapping raises one of ``mbref.records.BROKEN``.
 
         Returns
         -------
         Trajectory
             The trajectory, with arrays as attributes.
-
-        Raises
-        ------
-        ValueError, KeyError, TypeError, AttributeError, OverflowError
-            For another record; ``mbref.records.BROKEN`` are these types.
         """
         names, k = tuple(record["bodies"]), len(record["times"])
         crossings, events = record.get("crossings"), record.get("events")
-        marks, angles = record.get("open_reactions"), record.get("angles")
 
         def stacked(key: str, width: int) -> np.ndarray:
             rows = [record["bodies"][name][key] for name in names]
@@ -308,10 +302,6 @@ class Trajectory:
             given = all(record["bodies"][name].get(key) is not None for name in names)
             return stacked(key, 3) if given else None
 
-        def rows(lists: Mapping[str, Any], kind: type) -> dict[str, np.ndarray]:
-            return {name: np.array(values, dtype=kind).reshape(k) for name, values in lists.items()}
-
-        reactions = {n: np.array(v, dtype=float).reshape(k, 6) for n, v in record["reactions"].items()}
         found = Trajectory(
             scene=scene,
             **{key: record[key] for key in ("engine", "version", "method", "settings", "message", "t_end")},
@@ -323,9 +313,9 @@ class Trajectory:
             angular_velocity=stacked("angular_velocity", 3),
             acceleration=optional("acceleration"),
             angular_acceleration=optional("angular_acceleration"),
-            reactions=reactions or None,
-            open_reactions=None if marks is None else rows(marks, int),
-            angles=None if angles is None else rows(angles, float),
+            reactions=arrays(record["reactions"], (k, 6), float) or None,
+            open_reactions=arrays(record.get("open_reactions"), (k,), int),
+            angles=arrays(record.get("angles"), (k,), float),
             outcome=Outcome[record["outcome"]],
             cost=typed(Cost(**record["cost"])),
             crossings=None if crossings is None else tuple(Crossing.from_record(c) for c in crossings),

@@ -21,7 +21,7 @@ GYRATION = 30.0  # largest plausible radius of gyration / length of the mechanis
 STRONGEST = 100.0  # m/s²; largest plausible gravity
 FURTHEST = 100.0  # rad; largest plausible angle of a driver (16 turns; an angle in degrees is usually larger)
 DECIMALS = 3  # of an angle in degrees that a user writes
-ROUNDING = 1e-15  # relative error of an angle in degrees after the change to radians and back
+DEGREE_ROUNDING = 1e-15  # relative error of an angle in degrees after the change to radians and back
 INSTANTS = 101  # number of times at which a driver's value is computed
 # distance of a point from a plane / size of the mechanism that counts as zero; also cosine of a right angle
 FLAT_MECHANISM = 1e-6
@@ -70,7 +70,7 @@ def _may_be_degrees(angle: float) -> bool:
 
 def _is_round(angle: float) -> bool:
     """Return whether an angle (degrees) has few decimals."""
-    return abs(angle - round(angle, DECIMALS)) <= ROUNDING * abs(angle)
+    return abs(angle - round(angle, DECIMALS)) <= DEGREE_ROUNDING * abs(angle)
 
 
 def _degrees(path: str, angle: float) -> str:

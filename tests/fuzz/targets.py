@@ -91,6 +91,7 @@ def case(name: str, seed: int) -> tuple[str, str]:
     try:
         with warnings.catch_warnings(), _interrupted_after(PATIENCE.get(name, LONG)):
             warnings.simplefilter("error")
+            warnings.simplefilter("ignore", ResourceWarning)  # of an interrupt while a file is opened
             return TARGETS[name](seed), ""
     except KeyboardInterrupt:
         return "interrupted", ""

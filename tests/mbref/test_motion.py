@@ -2,6 +2,7 @@
 
 import csv
 import dataclasses
+import json
 import sys
 from pathlib import Path
 
@@ -76,8 +77,14 @@ def test_saved_motion_is_read_back_equal(crank, tmp_path):
     assert list(again.columns()) == list(crank.columns())
 
 
-def test_file_that_is_no_saved_motion_is_refused(tmp_path):
-    (tmp_path / "other.json").write_text('{"scene": 1}')
+FAULTS = {"t_end": "soon", "angles": {"A": [0.0]}, "cost": {"steps": "3"}, "bodies": {}, "times": [10**400]}
+
+
+@pytest.mark.parametrize("field", [None, *FAULTS])
+def test_file_that_is_no_saved_motion_is_refused(field, crank, tmp_path):
+    """It has no record, or a record in which one field has a value of another kind or length."""
+    whole = {"scene": crank.mechanism.to_dict(), "record": {**crank.to_record(), field: FAULTS.get(field)}}
+    (tmp_path / "other.json").write_text(json.dumps(whole if field else {"scene": 1}))
     with pytest.raises(ValueError, match=r"other\.json: is not a file that Motion\.save wrote"):
         Motion.load(tmp_path / "other.json")
 

@@ -33,6 +33,7 @@ from crosscheck.engines.loaders.machine import (
 from crosscheck.engines.loaders.posed import Pose
 from crosscheck.engines.mujoco.importing.couplings import of_equalities
 from crosscheck.engines.mujoco.importing.posing import JointRow
+from crosscheck.engines.mujoco.warnings_off import without_warnings
 
 TYPES = {0: "free", 1: "spherical", 2: TRANSLATIONAL, 3: REVOLUTE}  # by mjtJoint
 
@@ -50,6 +51,14 @@ class Mujoco(Loader):
         import mujoco
 
         return Compiled(mujoco, mujoco.MjModel.from_xml_path(str(path)))
+
+
+def compiled(path: Path) -> Machine:
+    """Return the machine of an MJCF file, without MuJoCo's warnings."""
+    import mujoco
+
+    with without_warnings(mujoco):
+        return Mujoco().load(path, MJCF).machine()
 
 
 class Compiled(Loaded):

@@ -12,8 +12,7 @@ from typing import Any
 
 from crosscheck.engines.loaders.loader import MJCF, SDF, URDF
 from crosscheck.engines.loaders.machine import Machine
-from crosscheck.engines.loaders.mujoco import Mujoco
-from crosscheck.engines.mujoco.warnings_off import without_warnings
+from crosscheck.engines.loaders.mujoco import compiled
 from crosscheck.engines.shared import xml_files
 from crosscheck.files.meaning import sdf, urdf
 from mbref.scene import SceneError
@@ -65,10 +64,7 @@ def _sizes(value: Any) -> Iterator[float]:
 def _meant(path: Path, form: str) -> Machine:
     if form == MJCF:
         try:
-            import mujoco
-
-            with without_warnings(mujoco):
-                return Mujoco().load(path, form).machine()
+            return compiled(path)
         except ValueError as error:
             raise SceneError([f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}"]) from None
         except ImportError:

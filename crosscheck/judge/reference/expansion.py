@@ -26,6 +26,7 @@ class Expansion:
     """The Taylor series about a time t: coordinates ``x`` (order + 3, 3, n), angles of loads of joints, and
     joint coordinates of couplings and armatures."""
 
+    @np.errstate(all="ignore")  # a series that is not finite has no reach, which ends the motion
     def __init__(
         self,
         of: NaturalCoordinates,

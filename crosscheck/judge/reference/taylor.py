@@ -155,10 +155,7 @@ class Stepper:
 
     def _expansion(self, order: int) -> Expansion:
         state = self._x, self._v
-        with np.errstate(all="ignore"):  # a series that is not finite has no reach, which ends the motion
-            return Expansion(
-                self.of, self._held, self._loads, order, self.t, state, self._angles, self._turned
-            )
+        return Expansion(self.of, self._held, self._loads, order, self.t, state, self._angles, self._turned)
 
     def _advance(self, expansion: Expansion, series: np.ndarray, h: float) -> None:
         d, settled = self.of.arithmetic.number(h), self.of.arithmetic.settled

@@ -109,6 +109,14 @@ def test_faulty_file_beside_right_records_is_named(name, content, tmp_path, caps
     assert name in capsys.readouterr().err
 
 
+GROUP = {
+    **{"within": 1e-5, "ended": {"lu": "", "qr": ""}, "seconds": {"lu": 0.1, "qr": 0.1}, "off": {}},
+    "pairs": [["lu", "qr", 1e-9, "acceleration", "b1"]],
+}
+GRAPH = {
+    **{"key": "k1", "engine": "mbref", "version": "1", "seed": 1, "scene": "graph", "bodies": 5},
+    **{"clearance": 0.1, "redundant": 3, "refused": "", "groups": [GROUP]},
+}
 INVARIANT = {
     "key": "mujoco, tuned whirl 1",
     **{"row": "mujoco, tuned", "engine": "mujoco", "version": "1", "family": "tuned", "message": ""},
@@ -139,16 +147,23 @@ EXPERIMENTS = {
     "values are missing": ({"values": None}, "x and values are required of a run"),
     "x is text": ({"x": "1"}, "x: input should be a valid number"),
 }
-RIGHT = {"closed-loops": RECORD, "convergence": RECORD, "invariants": INVARIANT}  # by the command of a table
-TABLES = [
-    (command, fault) for command in RIGHT for fault in (EXPERIMENTS if command == "invariants" else RUNS)
+WAYS = {
+    "pair has no size": ({"groups": [GROUP | {"pairs": [["lu", "qr"]]}]}, "pairs.0: must be two ways"),
+    "limit is zero": ({"groups": [GROUP | {"within": 0.0}]}, "within: input should be greater"),
+}
+TABLES = [  # the command of a table, its right record, and a faulty one
+    (command, record, *fault)
+    for command, record, faults in (
+        *(("closed-loops", RECORD, RUNS), ("convergence", RECORD, RUNS)),
+        *(("invariants", INVARIANT, EXPERIMENTS), ("alternatives", GRAPH, WAYS)),
+    )
+    for fault in faults.values()
 ]
 
 
-@pytest.mark.parametrize(("command", "fault"), TABLES)
-def test_table_of_records_names_the_faulty_field(command, fault, tmp_path, capsys):
+@pytest.mark.parametrize(("command", "record", "changes", "said"), TABLES)
+def test_table_of_records_names_the_faulty_field(command, record, changes, said, tmp_path, capsys):
     """A field has another value, or is missing (None). The table of the right record is printed."""
-    record, (changes, said) = RIGHT[command], (RUNS | EXPERIMENTS)[fault]
     faulty = {name: value for name, value in {**record, **changes}.items() if value is not None}
     assert table(command, tmp_path, faulty) == 2
     shown = capsys.readouterr().err
@@ -180,6 +195,12 @@ def test_record_without_a_line_end_is_in_the_table(command, record, tmp_path, ca
     """The table is the one of the record with a line end."""
     shown = [table(command, tmp_path, record, end) or capsys.readouterr().out for end in (b"", b"\n")]
     assert shown[0] == shown[1] != ""
+
+
+@pytest.mark.parametrize("command", ["alternatives", "closed-loops", "convergence", "invariants"])
+def test_table_of_a_missing_file_of_records_is_an_error(command, tmp_path, capsys):
+    assert crosscheck([command, "--records", str(tmp_path / "lost.jsonl")]) == 2
+    assert "lost.jsonl: has no records" in capsys.readouterr().err
 
 
 def test_records_of_another_mechanism_than_the_scene_file_are_named_and_not_left_out(tmp_path, capsys):
