@@ -1,4 +1,4 @@
-"""Accelerations and a short motion of a machine of hinges and slides, with its loops and couplings.
+"""Accelerations and a short motion of hinges and slides, with loops and couplings or ball and free joints.
 
 M a = -g - c - Σ dₙ v |v|ⁿ - Σ kₙ xⁿ⁺¹ + Gᵀλ and G a = -Ġ v: mass matrix M and gravity torques g, dampers d,
 springs k stretched by x, rows G, and velocity terms c = Σ m Jᵀ J̇ v + Rᵀ (I Ṙ v + ω × I ω) of bodies.
@@ -15,8 +15,8 @@ from scipy.integrate import solve_ivp
 
 from crosscheck.engines.loaders.constrained import accelerations, along
 from crosscheck.engines.loaders.loader import DURATION
-from crosscheck.engines.loaders.machine import FIXED, REVOLUTE, SCALAR, Machine, Vector
-from crosscheck.engines.loaders.posed import Pose, Posed
+from crosscheck.engines.loaders.machine import FIXED, REVOLUTE, SCALAR, Joint, Machine, Vector
+from crosscheck.engines.loaders.posed import Pose, Posed, in_single_axes
 from crosscheck.files.constraints import closed, projected, rows_of, scales, unknown
 from crosscheck.files.statics import moving_bodies, statics_of
 
@@ -58,18 +58,23 @@ def _rank(machine: Machine, pose: Pose, size: float) -> int:
 
 
 def states_of(machine: Machine, poses: Sequence[Pose], size: float, gravity: Vector) -> list[State]:
-    """Return a state with random rates at each pose; none for a machine with other joints than hinges and
-    slides, with a joint that moves no mass, or with constraints whose rows are unknown."""
-    moving = [joint for joint in machine.joints if joint.type != FIXED]
+    """Return a state with random rates of hinges and slides at each pose; ball and free joints begin at rest.
+
+    There is none for a machine with other joints, with a joint that moves no mass, with constraints whose
+    rows are unknown, or with constraints and a ball or free joint.
+    """
+    random, held = np.random.default_rng(SEED), bool(machine.loops or machine.couplings)
+    whole = machine if held else in_single_axes(machine)
+    moving = [joint for joint in whole.joints if joint.type != FIXED]
     if not 0 < len(moving) <= MOST or any(joint.type not in SCALAR for joint in moving) or unknown(machine):
         return []
-    random, held = np.random.default_rng(SEED), bool(machine.loops or machine.couplings)
-    most = {joint.name: SPEED if joint.type == REVOLUTE else SPEED * size for joint in moving}
-    found = []
+    single = [joint for joint in machine.joints if joint.type in SCALAR]
+    most = {joint.name: SPEED if joint.type == REVOLUTE else SPEED * size for joint in single}
+    found, still = [], {joint.name: 0.0 for joint in moving}
     for pose in closed_poses(machine, poses, size) if held else poses:
         rates = {name: float(random.uniform(-m, m)) for name, m in most.items()}
         rates = projected(machine, pose, rates, size) if held else rates
-        found.append(state_at(machine, pose, rates, size, gravity))
+        found.append(state_at(whole, still | pose, still | rates, size, gravity))
     return found if all(_moves(state.mass) for state in found) else []
 
 
@@ -102,15 +107,28 @@ def state_at(machine: Machine, pose: Pose, rates: Pose, size: float, gravity: Ve
 
 
 def accelerations_of(machine: Machine, state: State) -> dict[str, float]:
-    """Return the accelerations (rad/s² or m/s²) with the dampers and springs of a machine."""
-    joints, force = {joint.name: joint for joint in machine.joints}, state.force.copy()
+    """Return the accelerations of hinges and slides (rad/s² or m/s²) with the dampers and springs of a
+    machine."""
+    found, single = _accelerations(machine, state), _single(machine)
+    return {name: found[k] for k, name in enumerate(state.joints) if name in single}
+
+
+def _single(machine: Machine) -> dict[str, Joint]:
+    return {joint.name: joint for joint in machine.joints if joint.type in SCALAR}
+
+
+def _accelerations(machine: Machine, state: State) -> list[float]:
+    """Return the accelerations of all joints of a state (n)."""
+    joints, force = _single(machine), state.force.copy()
     for k, name in enumerate(state.joints):
+        if name not in joints:
+            continue
         joint, v = joints[name], state.rates[name]
         stretched = state.pose[name] + (joint.reference or 0.0) - (joint.rest or 0.0)
         force[k] -= sum(d * v * abs(v) ** n for n, d in enumerate(joint.damping or ()))
         force[k] -= sum(c * stretched ** (n + 1) for n, c in enumerate(joint.stiffness or ()))
-    found = accelerations(state.mass, force, state.rows, state.drift)
-    return dict(zip(state.joints, found.tolist(), strict=True))
+    made: list[float] = accelerations(state.mass, force, state.rows, state.drift).tolist()
+    return made
 
 
 class TooStiff(Exception):
@@ -118,16 +136,17 @@ class TooStiff(Exception):
 
 
 def end_of(machine: Machine, start: State, size: float, gravity: Vector) -> dict[str, float]:
-    """Return the displacements of joints after ``DURATION``, by DOP853; raises TooStiff."""
+    """Return the displacements of hinges and slides after ``DURATION``, by DOP853; raises TooStiff."""
     names, number, evaluated = start.joints, len(start.joints), itertools.count(1)
+    single = _single(machine)
+    whole = machine if len(single) == number else in_single_axes(machine)
 
     def change(_: float, y: np.ndarray) -> np.ndarray:
         if next(evaluated) * number > MOST_WORK:
             raise TooStiff
         pose, rates = (dict(zip(names, half.tolist(), strict=True)) for half in np.split(y, 2))
-        found = accelerations_of(machine, state_at(machine, pose, rates, size, gravity))
-        return np.concatenate([y[number:], [found[name] for name in names]])
+        return np.append(y[number:], _accelerations(machine, state_at(whole, pose, rates, size, gravity)))
 
     y = np.array([part[name] for part in (start.pose, start.rates) for name in names])
     run = solve_ivp(change, (0.0, DURATION), y, method="DOP853", rtol=RTOL, atol=RTOL)
-    return dict(zip(names, run.y[:number, -1].tolist(), strict=True))
+    return {name: float(q) for name, q in zip(names, run.y[:number, -1], strict=True) if name in single}

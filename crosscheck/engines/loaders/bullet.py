@@ -67,6 +67,7 @@ class Multibodies(Loaded):
     def __init__(self, pybullet: Any, numbers: list[int], has_gravity: bool):
         self.p, self.has_gravity = pybullet, has_gravity  # of the file's format
         self.links = [(b, j) for b in numbers for j in range(BASE, pybullet.getNumJoints(b))]
+        self.start = {b: pybullet.getBasePositionAndOrientation(b) for b in numbers}
         for b, j in self.links:
             if j != BASE and self._type(b, j) in SCALAR:
                 pybullet.resetJointState(b, j, 0.0)
@@ -138,8 +139,13 @@ class Multibodies(Loaded):
         names = {(b, j): str(p.getJointInfo(b, j)[1].decode()) for b, j in single}
         p.setGravity(*gravity)
         p.setPhysicsEngineParameter(fixedTimeStep=step, numSubSteps=0)
+        if any(j != BASE and self._type(b, j) == "spherical" for b, j in self.links):
+            raise NotImplementedError("PyBullet's motors of ball joints are not switched off")
         for b, j in self.links:
             p.setCollisionFilterGroupMask(b, j, 0, 0)
+            if j == BASE:
+                p.resetBasePositionAndOrientation(b, *self.start[b])
+                p.resetBaseVelocity(b, [0, 0, 0], [0, 0, 0])
         for at, name in names.items():
             p.resetJointState(*at, pose.get(name, 0.0), rates.get(name, 0.0))
             p.setJointMotorControl2(*at, p.VELOCITY_CONTROL, force=0.0)

@@ -85,6 +85,7 @@ class Skeletons(Loaded):
         self.dart, self.skeletons, self.world = dart, skeletons, world
         self.joints = [s.getJoint(k) for s in skeletons for k in range(s.getNumJoints())]
         self.nodes = [s.getBodyNode(k) for s in skeletons for k in range(s.getNumBodyNodes())]
+        self.start = [np.array(s.getPositions()) for s in skeletons]
         self.messages = tuple(self._moved())
 
     def machine(self) -> Machine:
@@ -194,6 +195,9 @@ class Skeletons(Loaded):
         return [joint for joint in self.joints if joint.getNumDofs() == 1]
 
     def _put(self, pose: Pose, rates: Pose) -> None:
+        for skeleton, start in zip(self.skeletons, self.start, strict=True):
+            skeleton.setPositions(start)
+            skeleton.setVelocities(0.0 * start)
         for joint in self._single():
             joint.setPosition(0, pose.get(joint.getName(), 0.0))
             joint.setVelocity(0, rates.get(joint.getName(), 0.0))

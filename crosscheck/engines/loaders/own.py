@@ -30,7 +30,7 @@ from crosscheck.engines.loaders.machine import (
     vector,
 )
 from crosscheck.engines.loaders.placing import ORIGIN, Place, vector_of
-from crosscheck.engines.loaders.posed import Pose, Posed
+from crosscheck.engines.loaders.posed import Pose, Posed, in_single_axes
 from crosscheck.engines.mujoco.importing.actuators import Actuators
 from crosscheck.judge.small_motions.posed import posed as restarted
 from mbref import formats, rotations
@@ -182,7 +182,7 @@ class Imported(Loaded):
 
     def accelerations(self, pose: Pose, rates: Pose, gravity: Vector) -> dict[str, float]:
         """Return accelerations of joints from mbref's accelerations of bodies at the start of a run."""
-        at, machine = self._run(pose, rates, gravity, np.zeros(1)), self.machine()
+        at, machine = self._run(pose, rates, gravity, np.zeros(1)), in_single_axes(self.machine())
         posed = Posed(machine, pose)
         if at.acceleration is None or at.angular_acceleration is None or not len(at.times):
             raise ValueError(at.message)

@@ -243,6 +243,10 @@ class Built(Loaded):
     ) -> dict[str, float]:
         """Simulate by RK4 of crosscheck in steps ten times as long; Pinocchio has no integrator."""
         names = tuple(self._single())
+        if len(names) < self.coupled.nv:
+            raise NotImplementedError(
+                "Pinocchio has no integrator, and crosscheck has one for hinges and slides"
+            )
 
         def change(y: np.ndarray) -> np.ndarray:
             at, v = (dict(zip(names, half.tolist(), strict=True)) for half in np.split(y, 2))

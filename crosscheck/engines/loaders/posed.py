@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
-from crosscheck.engines.loaders.machine import REVOLUTE, SCALAR, WORLD, Joint, Machine
+from crosscheck.engines.loaders.machine import REVOLUTE, SCALAR, TRANSLATIONAL, WORLD, Joint, Machine, vector
 from crosscheck.engines.loaders.placing import ORIGIN, Place, turned
 
 Pose = dict[str, float]  # displacements of joints from the reference pose, rad or m
+SINGLE = {"spherical": (REVOLUTE,), "free": (TRANSLATIONAL, REVOLUTE)}  # types, each along or about 3 axes
 
 
 class Posed:
@@ -46,6 +48,25 @@ class Posed:
         found[:3, k] = np.where(turns, np.cross(axes, arms), axes).T
         found[3:, k] = np.where(turns, axes, 0.0).T
         return found
+
+
+def in_single_axes(machine: Machine) -> Machine:
+    """Return the machine with slides along and hinges about the world's axes for ball and free joints.
+
+    At the reference pose their rates are velocities. Joints with dampers, springs or armature stay.
+    """
+    return replace(machine, joints=tuple(part for joint in machine.joints for part in _parts(joint)))
+
+
+def _parts(joint: Joint) -> Iterator[Joint]:
+    forces = *(joint.damping or ()), *(joint.stiffness or ()), joint.armature
+    if joint.type not in SINGLE or any(forces):
+        yield joint
+        return
+    for kind in SINGLE[joint.type]:
+        for name, axis in zip("xyz", np.eye(3), strict=True):
+            anchor = joint.anchor or (0.0, 0.0, 0.0)
+            yield Joint(f"{joint.name} {kind} {name}", kind, joint.bodies, anchor, vector(axis))
 
 
 def _chains(machine: Machine) -> dict[str, list[Joint]]:

@@ -19,6 +19,7 @@ from mbref.scene import SceneError
 from mbref.scene.fields import LARGEST
 
 FORMS = {"mujoco": MJCF, "mujocoinclude": MJCF, "robot": URDF, "sdf": SDF}
+USD = (".usd", ".usda", ".usdc", ".usdz")
 SOURCES = {
     URDF: "the specification of URDF (wiki.ros.org/urdf/XML)",
     SDF: "the specification of SDFormat (sdformat.org/spec)",
@@ -28,6 +29,8 @@ SOURCES = {
 
 def form_of(path: Path) -> str:
     """Return the format of a file by its root element; raises SceneError, OSError."""
+    if path.suffix.lower() in USD:
+        raise SceneError([f"{path}: is USD, which crosscheck does not read; export it as MJCF, URDF or SDF"])
     root = xml_files.parsed(path)
     if root.tag not in FORMS:
         known = ", ".join(f"<{tag}> ({form})" for tag, form in FORMS.items() if tag != "mujocoinclude")

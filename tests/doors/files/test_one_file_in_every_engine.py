@@ -156,17 +156,32 @@ def test_mass_matrix_and_gravity_torques_are_mujocos_at_four_poses(tmp_path: Pat
     assert [(d.field, d.name) for d in found] == [("mass matrix", "elbow")]
 
 
-@pytest.mark.parametrize("what", ["tree", "connect", "joint"])
+def carried_by(joint: str) -> str:
+    """Return an arm with a sprung and damped elbow on a body with a joint, under gravity."""
+    elbow = '<joint name="elbow" type="hinge" axis="0 1 0" damping="0.3" stiffness="5" springref="20"/>'
+    text = model(
+        body("upper", joint + body("lower", elbow + body("hand", '<joint name="wrist" axis="1 0 0"/>')))
+    )
+    return text.replace("<worldbody>", '<option gravity="1 2 -9"/><worldbody>')
+
+
+TREES = {
+    "tree": HINGE.replace("/>", ' damping="0.2"/>'),
+    "ball": '<joint type="ball"/>',
+    "free": "<freejoint/>",
+}
+
+
+@pytest.mark.parametrize("what", [*TREES, "connect", "joint"])
 def test_accelerations_and_motion_are_mujocos_and_an_engine_without_dampers_is_named(what, tmp_path):
-    """MuJoCo's own terms at random states, with a spring and two dampers, and without these, in a tree,
-    with a loop and with a coupling."""
-    tree = '<joint name="elbow" type="hinge" axis="0 1 0" damping="0.3" stiffness="5" springref="20"/>'
-    text = model(body("upper", HINGE.replace("/>", ' damping="0.2"/>') + body("lower", tree)))
-    text = text.replace("<worldbody>", '<option gravity="1 2 -9"/><worldbody>')
-    if what != "tree":
+    """MuJoCo's own terms at random states, with a spring and dampers, and without these, in trees, also with
+    a ball and a free joint, with a loop and with a coupling."""
+    if what in TREES:
+        text = carried_by(TREES[what])
+    else:
         text = one_equality(what).replace('name="elbow"', 'name="elbow" damping="0.3"')
     file = file_of(written(tmp_path, text))
-    assert len(file.asked.starts) == 1 and len(file.asked.closed) == (0 if what == "tree" else 4)
+    assert len(file.asked.starts) == 1 and len(file.asked.closed) == (0 if what in TREES else 4)
     match = matched(file.machine, file.machine, DOUBLE)
     dampers = {joint.name for joint in file.machine.joints if joint.damping}
     for text_of_engine, said in ((text, set()), (re.sub(' damping="[^"]*"', "", text), dampers)):
@@ -178,22 +193,18 @@ def test_accelerations_and_motion_are_mujocos_and_an_engine_without_dampers_is_n
         assert {d.name for d in found} == said and {d.field for d in found} <= {"damping"}
 
 
-@pytest.mark.parametrize("what", ["connect", "joint"])
-def test_motion_on_the_closure_is_mbrefs_and_mujocos(what: str, tmp_path: Path):
-    """Two independent runs of 0.1 s from a random state that obeys the equality: our import by mbref, and
+@pytest.mark.parametrize("what", [pytest.param("ball", marks=pytest.mark.slow), "free", "connect", "joint"])
+def test_motion_is_mbrefs_and_mujocos(what: str, tmp_path: Path):
+    """Two independent runs of 0.1 s from a random state that obeys equalities: our import by mbref, and
     MuJoCo in small steps."""
-    file = file_of(written(tmp_path, one_equality(what)))
+    file = file_of(written(tmp_path, carried_by(TREES[what]) if what in TREES else one_equality(what)))
     for reader, tolerance in ((Own(), 1e-7), (Mujoco(), 1e-3)):  # MuJoCo's equalities are soft
         found = built(reader, file.path, MJCF, file.asked)
         assert found.ends and found.accelerations
         assert differences(matched(file.machine, found.machine, DOUBLE), file, found, DOUBLE) == []
         ends = [since(file.asked.starts[0][0], end) for end in found.ends]
-        assert (
-            of_values(
-                matched(file.machine, found.machine, DOUBLE), ends, file.moved, "displacement", tolerance
-            )
-            == []
-        )
+        match = matched(file.machine, found.machine, DOUBLE)
+        assert of_values(match, ends, file.moved, "displacement", tolerance) == []
 
 
 def first_row(rows: Any) -> Any:
