@@ -254,9 +254,7 @@ def test_verdict_names_what_is_dropped_and_whether_the_reader_says_so(tmp_path: 
 
 def test_advice_was_tried_and_refusals_have_the_readers_message(tmp_path: Path, capsys: Any):
     """The strict reader needs a model's name; unit axes, which the file also lacks, do not help it."""
-    text = LOOP.replace(' model="arm"', "").replace(
-        'name="elbow" type="hinge" axis="0 1 0"', 'name="elbow" axis="0 2 0"'
-    )
+    text = LOOP.replace(' model="arm"', "").replace('axis="0 1 0"', 'axis="0 2 0"')
     assert main(["files", str(written(tmp_path, text)), "--engine", f"{READERS}:Strict"]) == 1
     printed = capsys.readouterr().out
     assert "cannot read: ValueError: the model has no name" in printed
@@ -274,7 +272,9 @@ def test_faulty_file_and_unknown_reader_are_refused_in_a_sentence(tmp_path: Path
     assert main(["files", str(bad)]) == 2
     assert "the links are no tree with one root: a, b" in capsys.readouterr().err
     assert main(["files", str(written(tmp_path, LOOP)), "--engine", "mojoco"]) == 2
-    assert "did you mean 'mujoco'" in capsys.readouterr().err
+    assert main(["files", str(written(tmp_path, "#usda 1.0", "arm.usda"))]) == 2
+    printed = capsys.readouterr().err
+    assert "did you mean 'mujoco'" in printed and "is USD" in printed
 
 
 def test_own_import_reads_public_files_of_robots_or_refuses_them_by_name():
