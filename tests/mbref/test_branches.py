@@ -8,7 +8,7 @@ import pytest
 from crosscheck.conformance.mechanisms.parts import linkage
 from mbref.cli import main
 from mbref.design.along_motion import along_motion
-from mbref.equations.branches import ALONE, MULTIPLE, second_order
+from mbref.equations.branches import second_order
 from mbref.equations.initial_state import consistent_start
 from mbref.equations.model import Model
 from mbref.method import MethodError
@@ -31,7 +31,7 @@ def test_flat_rhombus_lists_its_smooth_and_its_folding_branch():
     """At θ = π the coupler may fold on the crank, and the rocker rests: rates (ω, ω, 0). On the smooth branch
     the coupler stays parallel: rates (ω, 0, ω). At θ = 0 the fold would need a crank at rest."""
     first, second = simulate(four_bar(), "taylor", [0.05]).crossings
-    assert first.sentence == ALONE and second.sentence == "2 branches" and second.taken == 1
+    assert first.sentence == "one branch" and second.sentence == "2 branches" and second.taken == 1
     expected = np.array([[-RATE, 0.0, -RATE], [-RATE, -RATE, 0.0]])
     assert np.abs(second.angular_velocity[:, :, 2] - expected).max() < SLOW
     assert np.abs(second.position[:, 1]).max() < ROUNDING, "all bodies lie on the x axis there"
@@ -41,7 +41,7 @@ def test_flat_five_bar_has_one_branch_at_every_crossing():
     """A bar keeps the coupler parallel to the ground, so that it cannot fold. In 0.05 s the
     crank turns by 6.24 rad from π/2 and is flat at 0 and -π."""
     crossings = simulate(five_bar(), "taylor", [0.05]).crossings
-    assert len(crossings) == 2 and {c.sentence for c in crossings} == {ALONE}
+    assert len(crossings) == 2 and {c.sentence for c in crossings} == {"one branch"}
 
 
 def test_folding_branch_of_a_driven_rhombus_lays_the_coupler_on_the_crank():
@@ -78,7 +78,8 @@ def test_chain_flat_in_all_loops_lists_the_smooth_branch_and_the_fold_of_its_fir
     its first upright alone rests. The sentence says that there are further branches."""
     run = simulate(four_bar_chain(loops), "taylor", [1.0])
     (crossing,) = run.crossings
-    assert np.abs(crossing.position[:, 1]).max() < ROUNDING and crossing.sentence == "2 branches" + MULTIPLE
+    assert np.abs(crossing.position[:, 1]).max() < ROUNDING
+    assert crossing.sentence == "2 branches and others that second order does not determine"
     resting = np.abs(crossing.angular_velocity[:, : loops + 1, 2]) < SLOW
     assert not resting[0].any() and resting[1].tolist() == [True] + [False] * loops
 

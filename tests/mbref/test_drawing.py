@@ -9,7 +9,6 @@ import pytest
 
 from mbref import rotations
 from mbref.motions.drawing.film import png
-from mbref.motions.drawing.labels import LETTER, LINE_HEIGHT
 from mbref.motions.drawing.marks import SIGNS
 from mbref.motions.drawing.picture import moving, side_by_side, still
 from mbref.motions.drawing.shapes import at_rest, shapes
@@ -19,6 +18,7 @@ from mbref.scene import JOINT_TYPES, Scene
 from mbref.scenes import SCENES
 from tests.helpers.parts import X, Y, Z, spring
 
+LETTER, LINE_HEIGHT = 7.4, 15.0  # px, of a mean letter and a line of sans-serif text of 13 px
 CLEAR = 3.5  # px, least distance between a bar's middle line, 6 px wide, and the box of a name
 SVG = "{http://www.w3.org/2000/svg}"
 

