@@ -12,6 +12,8 @@ from mbref.simulation import VERSION
 
 if TYPE_CHECKING:
     from mbref.design.along_motion import AlongMotion, along_motion
+    from mbref.design.derivatives.result import Sensitivities
+    from mbref.design.derivatives.sensitivities import sensitivities
     from mbref.design.diagnosis import Diagnosis, diagnose
     from mbref.design.equilibrium import Equilibrium, equilibria, motion_of_mode
     from mbref.design.exchange import exchanges
@@ -38,6 +40,8 @@ if TYPE_CHECKING:
 __version__ = VERSION
 
 _PUBLIC = {  # module → its public names
+    "design.derivatives.result": ("Sensitivities",),
+    "design.derivatives.sensitivities": ("sensitivities",),
     "design.along_motion": ("AlongMotion", "along_motion"),
     "design.diagnosis": ("Diagnosis", "diagnose"),
     "design.equilibrium": ("Equilibrium", "equilibria", "motion_of_mode"),
@@ -80,6 +84,7 @@ __all__ = [
     "Outcome",
     "Scene",
     "SceneError",
+    "Sensitivities",
     "Trajectory",
     "Variation",
     "along_motion",
@@ -94,6 +99,7 @@ __all__ = [
     "idle_freedoms",
     "motion_of_mode",
     "plot",
+    "sensitivities",
     "simulate",
     "still",
     "sweep",

@@ -16,6 +16,7 @@ from mbref.cli.pictures import add as add_pictures
 from mbref.cli.plotting import add as add_plotting
 from mbref.cli.run import add as add_run
 from mbref.cli.scene_files import add as add_scene_files
+from mbref.cli.sensitivities import add as add_sensitivities
 from mbref.cli.statics import add as add_statics
 from mbref.cli.tables import add as add_tables
 from mbref.command_line import Parser, commands, status_of
@@ -79,6 +80,7 @@ def parser() -> argparse.ArgumentParser:
         add_run,
         add_plotting,
         add_statics,
+        add_sensitivities,
         add_ensemble,
         add_exchange,
         add_tables,

@@ -11,11 +11,11 @@ the pose is at rest in a frame that turns with the driver (turning.py), and x'' 
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
 
 import numpy as np
 
 from mbref.design.allowed_motions import TANGENT_RANK, ConstraintRows, by_gauss
+from mbref.design.differences import directional_derivative
 from mbref.design.turning import TURNED_BY, UNCHANGED, Turning
 from mbref.equations.gaps import gaps
 from mbref.equations.joint_angles import angles_at, counted_from
@@ -27,7 +27,6 @@ from mbref.scene import SceneError
 DIFFERENCE_STEP = 0.005
 SHORT = 0.04  # factor on DIFFERENCE_STEP for differences of second order
 UNEQUAL = 1e4  # largest / least stiffness, above which errors of the largest disturb the least
-CENTRAL = (4 / 5, -1 / 5, 4 / 105, -1 / 280)  # weights of central differences of order 8
 WEIGHTLESS = 1e-20  # mass along a tangent / largest mass, below which no mass resists the forces
 EPSILON = float(np.finfo(float).eps)
 
@@ -158,21 +157,15 @@ class Tangent:
     def linear_part(self, share: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
         """Return A = ∂y''/∂y and B = ∂y''/∂y' (f, f) by differences of order 8, with a share of the step."""
         zero, steps = np.zeros(self.freedoms), share * DIFFERENCE_STEP / self.sizes
-        by_place = [_directional_derivative(lambda y: self.accelerations(y, zero), h) for h in np.diag(steps)]
+        by_place = [directional_derivative(lambda y: self.accelerations(y, zero), h) for h in np.diag(steps)]
         place, fast = np.array(by_place).T / steps, steps * self.rate_scale
-        by_rate = [_directional_derivative(lambda y: self.accelerations(zero, y), h) for h in np.diag(fast)]
+        by_rate = [directional_derivative(lambda y: self.accelerations(zero, y), h) for h in np.diag(fast)]
         return place, np.array(by_rate).T / fast
 
     @property
     def rate_scale(self) -> float:
         """Rate, 1/s, of motions by the forces over one length of the mechanism; 1 without forces."""
         return float(np.sqrt((self.pushes / self.sizes).max(initial=0.0))) or 1.0
-
-
-def _directional_derivative(function: Callable[[np.ndarray], np.ndarray], h: np.ndarray) -> np.ndarray:
-    """Return the change of a function along a vector h, to first order."""
-    parts = [w * (function(k * h) - function(-k * h)) for k, w in enumerate(CENTRAL, 1)]
-    return np.asarray(np.sum(parts, axis=0))
 
 
 def norms_by_body(x: np.ndarray) -> np.ndarray:

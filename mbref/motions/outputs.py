@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -150,28 +151,36 @@ def columns_of(owner: Owner, name: str, numbers: Mapping[str, Any]) -> Iterator[
             yield from output.columns(name, values)
 
 
-def all_columns(motion: Any) -> dict[str, np.ndarray]:
-    """Return ``time`` and all columns (k,) of a Motion, by name."""
+def all_columns(motion: Any, names: Sequence[str] = ()) -> dict[str, np.ndarray]:
+    """Return ``time`` and all columns (k,) of a Motion, by name; with ``names`` of columns, the columns of
+    their owners only."""
     scene, table = motion.mechanism, {"time": motion.times}
-    for name in motion.bodies:
-        table.update(columns_of("body", name, vars(motion[name])))
-    for joint in scene.joint:
-        table.update(columns_of("joint", joint.name, vars(motion.joint(joint.name))))
-    for driver in scene.driver:
-        table.update(columns_of("driver", driver.joint, vars(motion.driver(driver.joint))))
-    for place in range(len(scene.load)):
-        table.update(columns_of("load", str(place), vars(motion.load_at(place))))
-    table.update(columns_of("mechanism", "", _totals(motion)))
+    owners: dict[tuple[Owner, str], Callable[[], Any]] = {
+        **{("body", name): partial(motion.__getitem__, name) for name in motion.bodies},
+        **{("joint", joint.name): partial(motion.joint, joint.name) for joint in scene.joint},
+        **{("driver", each.joint): partial(motion.driver, each.joint) for each in scene.driver},
+        **{("load", str(place)): partial(motion.load_at, place) for place in range(len(scene.load))},
+    }
+    for (owner, name), find in owners.items():
+        if not names or any(column.startswith(PREFIXES[owner].format(name)) for column in names):
+            table.update(columns_of(owner, name, vars(find())))
+    table.update(columns_of("mechanism", "", _totals(motion, names)))
     return table
 
 
-def _totals(motion: Any) -> dict[str, np.ndarray | None]:
-    """Return the numbers of the whole mechanism by their names in the table of outputs."""
-    levels = {f"{level}_violation": rows for level, rows in motion.violation._asdict().items()}
-    energies = ("kinetic_energy", "potential_energy", "energy") if motion.mechanism.has_mass() else ()
-    found = {name: getattr(motion, name) for name in energies}
-    estimate = None if motion.error_estimate is None else motion.error_estimate.error
-    return {**levels, "largest_reaction": motion.largest_reaction, **found, "error_estimate": estimate}
+def _totals(motion: Any, names: Sequence[str]) -> dict[str, np.ndarray | None]:
+    """Return the numbers of the whole mechanism by their names in the table of outputs; with ``names``, those
+    numbers only."""
+    known: dict[str, Callable[[], np.ndarray | None]] = {
+        f"{level}_violation": partial(lambda level: getattr(motion.violation, level), level)
+        for level in ("position", "velocity", "acceleration")
+    }
+    known["largest_reaction"] = lambda: motion.largest_reaction
+    if motion.mechanism.has_mass():
+        energies = ("kinetic_energy", "potential_energy", "energy")
+        known |= {name: partial(getattr, motion, name) for name in energies}
+    known["error_estimate"] = lambda: motion.error_estimate and motion.error_estimate.error
+    return {name: find() for name, find in known.items() if not names or name in names}
 
 
 def chosen(columns: Mapping[str, Any] | Sequence[str], names: Sequence[str]) -> list[str]:

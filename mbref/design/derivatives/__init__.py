@@ -1,0 +1,1 @@
+"""Derivatives of motions with respect to numbers of the scene."""

@@ -1,0 +1,117 @@
+"""Derivatives of the columns of a motion along changes of its states, and by numbers at equal states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mbref.design.derivatives.numbers_of_scene import SceneNumber
+from mbref.design.derivatives.states import Direction, States
+from mbref.design.differences import CENTRAL
+from mbref.equations.joint_reactions import reactions
+from mbref.equations.model import Model
+from mbref.equations.offsets import counted_angles
+from mbref.input_error import InputError
+from mbref.motions.motion import Motion
+from mbref.motions.outputs import all_columns, chosen, quantity_of
+from mbref.scene import Scene
+from mbref.scene.bodies import DRIVER
+
+EPSILON = float(np.finfo(float).eps)
+# quantities that count, are largest values, or vanish on the exact motion
+WITHOUT_DERIVATIVE = (
+    *("time", "open", "active", "impulse", "angular_impulse", "largest_reaction", "error_estimate"),
+    *("position_violation", "velocity_violation", "acceleration_violation"),
+)
+
+
+FORCES = ("force", "moment", "torque", "power")  # quantities of joints and drivers that need reactions
+
+
+def differentiable(motion: Motion, names: Sequence[str]) -> list[str]:
+    """Return the columns of a motion with these names or beginnings.
+
+    Raises InputError for a column without derivatives, and for a reaction that redundant constraints share.
+    """
+    found = chosen(motion.columns(), names)
+    needs_reactions = any(quantity_of(column) in FORCES for column in found if column != "time")
+    shared = _shared(motion) if needs_reactions else set()
+    for column in found:
+        if column == "time" or quantity_of(column) in WITHOUT_DERIVATIVE:
+            raise InputError(f"of: {column!r} has no derivative")
+        if column in shared:
+            raise InputError(
+                f"of: {column!r}: redundant constraints share it, and equilibrium does not determine it"
+            )
+    return found
+
+
+def _shared(motion: Motion) -> set[str]:
+    """Return the columns of reactions and drivers that equilibrium does not determine."""
+    scene, found = motion.mechanism, set()
+    for name, determined in motion.determined_reactions.items():
+        for k in np.flatnonzero(~determined.all(axis=0)):
+            found.add(f"{name}.{'force' if k < 3 else 'moment'}.{'xyz'[k % 3]}")
+    for driver in scene.driver:
+        if (marks := motion.driver(driver.joint).open) is not None and marks.any():
+            found |= {f"{DRIVER.format(driver.joint)}.{quantity}" for quantity in FORCES}
+    return found
+
+
+class Columns:
+    """Columns (k, columns) of a motion as a function of its states."""
+
+    def __init__(self, motion: Motion, names: Sequence[str], step: float):
+        self.motion, self.names, self.step = motion, names, step
+        self._has_reactions = any(quantity_of(name) in FORCES for name in names)
+
+    def at(self, scene: Scene, model: Model, states: States) -> np.ndarray:
+        """Return the columns at states of the model of a scene."""
+        k, nb = states.times.size, model.nb
+        q, v, a = states.q.reshape(k, nb, 7), states.v.reshape(k, nb, 6), states.a.reshape(k, nb, 6)
+        wrenches = None
+        if self._has_reactions and not model.kinematic:
+            blocks = model.terms(states.times, states.q).blocks
+            wrenches = reactions(model, q, blocks, states.multipliers)
+        motion = replace(
+            self.motion,
+            mechanism=scene,
+            times=states.times,
+            **model.motion(q, v, a),
+            reactions=wrenches,
+            open_reactions=None,
+            angles=counted_angles(scene, model.structure, states.angles),
+        )
+        table = all_columns(motion, self.names)
+        return np.array([table[name] for name in self.names]).T
+
+    def along(self, model: Model, states: States, direction: Direction) -> tuple[np.ndarray, np.ndarray]:
+        """Return the derivative (k, columns) along a direction of states, and its rounding."""
+        scene, steps = self.motion.mechanism, direction.steps(states, model, self.step)[:, None]
+        total, largest = np.zeros((states.times.size, len(self.names))), np.zeros(len(self.names))
+        for k, weight in enumerate(CENTRAL, 1):
+            for sign in (1.0, -1.0):
+                found = self.at(scene, model, states.moved(direction, sign * k * steps[:, 0]))
+                total += sign * weight * found
+                largest = np.maximum(largest, np.abs(found).max(axis=0, initial=0.0))
+        return total / steps, EPSILON * self._largest(largest) / steps
+
+    def by_number(self, number: SceneNumber, states: States) -> tuple[np.ndarray, np.ndarray]:
+        """Return the derivative (k, columns) by a number at equal states, and its rounding."""
+        largest = np.zeros(len(self.names))
+
+        def at(scene: Scene, model: Model) -> np.ndarray:
+            found = self.at(scene, model, states)
+            np.maximum(largest, np.abs(found).max(axis=0, initial=0.0), out=largest)
+            return found
+
+        derivative = number.derivative(at)
+        rounding = EPSILON * self._largest(largest) * np.abs(number.weights).max()
+        return derivative, rounding * np.ones_like(derivative)
+
+    def _largest(self, values: np.ndarray) -> np.ndarray:
+        """Return the largest of values (columns,) of one quantity, whose components round alike."""
+        quantities = np.array([*map(quantity_of, self.names)])
+        return np.array([values[quantities == quantity].max() for quantity in quantities])

@@ -1,0 +1,74 @@
+"""Panels of time with Gauss points, and collocation of a linear differential equation in them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+
+
+class Precision(NamedTuple):
+    """Number of Gauss points of a panel, and the step of differences, see ``Direction.steps``."""
+
+    points: int
+    step: float
+
+
+class Gauss(NamedTuple):
+    """Gauss points (N,) in (0, 1) and their weights (N,).
+
+    ``analysis`` (N, N) gives Legendre coefficients of a function from its values at the points, ``integrals``
+    (N, N) are of the Lagrange polynomials from 0 to each point.
+    """
+
+    points: np.ndarray
+    weights: np.ndarray
+    analysis: np.ndarray
+    integrals: np.ndarray
+
+    def integrals_to(self, share: float) -> np.ndarray:
+        """Return the integrals (N,) of the Lagrange polynomials from 0 to a share of the panel."""
+        return _integrals(np.array([share]), self.analysis)[0]
+
+
+def gauss(count: int) -> Gauss:
+    """Return the Gauss points of a panel."""
+    x, w = legendre.leggauss(count)
+    values = legendre.legvander(x, count - 1)
+    analysis = (values * w[:, None]).T * (np.arange(count) + 0.5)[:, None]
+    points = 0.5 * (x + 1.0)
+    return Gauss(points, 0.5 * w, analysis, _integrals(points, analysis))
+
+
+def _integrals(ends: np.ndarray, analysis: np.ndarray) -> np.ndarray:
+    """Return the integrals (e, N) of the Lagrange polynomials from 0 to ends (e,)."""
+    count = len(analysis)
+    of_legendre = np.empty((len(ends), count))
+    for k in range(count):
+        series = legendre.legint(np.eye(count)[k], lbnd=-1)
+        of_legendre[:, k] = 0.5 * legendre.legval(2.0 * ends - 1.0, series)
+    return of_legendre @ analysis
+
+
+class CollocationPanel(NamedTuple):
+    """The equation y' = A y + b in a panel of ``length`` seconds: A (N, d, d) and b (N, d, c) at its
+    points."""
+
+    length: float
+    matrix: np.ndarray
+    rhs: np.ndarray
+
+    def rates(self, start: np.ndarray, rule: Gauss) -> np.ndarray:
+        """Return y' (N, d, c) at the points, of the solution with y = start (d, c)."""
+        count, size = self.matrix.shape[:2]
+        within = self.length * rule.integrals[:, None, :, None] * self.matrix[:, :, None, :]
+        system = np.eye(count * size) - within.reshape(count * size, count * size)
+        given = self.matrix @ start + self.rhs
+        return np.linalg.solve(system, given.reshape(count * size, -1)).reshape(given.shape)
+
+
+def tails(values: np.ndarray, rule: Gauss) -> np.ndarray:
+    """Return the largest of the last two Legendre coefficients (panels,) of functions with values (panels, N,
+    n)."""
+    return np.abs(np.einsum("cp,jpn->jcn", rule.analysis[-2:], values)).max(axis=(1, 2), initial=0.0)

@@ -1,0 +1,178 @@
+"""sensitivities: derivatives of outputs of a motion with respect to numbers of its scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from mbref.design.derivatives.columns import Columns, differentiable
+from mbref.design.derivatives.followed import Followed
+from mbref.design.derivatives.numbers_of_scene import SceneNumber, scene_number, unit_of_number
+from mbref.design.derivatives.panels import Precision, gauss
+from mbref.design.derivatives.result import Sensitivities
+from mbref.design.derivatives.start_numbers import StartNumber, is_of_start, start_number
+from mbref.design.derivatives.variational import VariationalEquations
+from mbref.equations.model import Model
+from mbref.equations.offsets import assembled
+from mbref.input_error import InputError
+from mbref.method import SERIES_METHOD, Method, default_method
+from mbref.motions.outputs import UNIT_OF, quantity_of
+from mbref.motions.pieces import is_intermittent
+from mbref.motions.trajectory import Outcome
+from mbref.scene import Scene
+from mbref.scenes import find_scene
+from mbref.simulation.simulate import SAMPLES, checked_times
+from mbref.stepping.limits import FINEST, Limits
+
+# of a solution, and of a more accurate one. Truncation of the step h is h⁸ near a spring of unit length, and
+# rounding is 2e-16/h
+FIRST_PRECISION, SECOND_PRECISION = Precision(12, 0.02), Precision(16, 0.01)
+RTOL = 1e-12  # default relative tolerance of the runs
+FINER = 0.1  # tolerance of the more accurate run / tolerance
+ORDER = 24  # order of the series of the more accurate run
+DIFFERENCE_ROUNDING = (
+    2e-14  # error of a difference of order 8 / largest value of the derivative over the samples
+)
+MOST_ROWS = 400  # constraint rows, whose singular values are computed at every point
+
+
+def sensitivities(
+    scene: Scene | str | Path,
+    of: Sequence[str],
+    to: Sequence[str],
+    times: Sequence[float] | np.ndarray | None = None,
+    limits: Limits | None = None,
+) -> Sensitivities:
+    """Return derivatives of outputs of a motion with respect to numbers of the scene.
+
+    They follow from the variational equations of the motion. All other numbers of the scene stay as they are:
+    loops stay closed because an anchor is one point of the world at t = 0, fixed in both bodies.
+
+    Parameters
+    ----------
+    scene : Scene, str or path
+        A Scene, the name of a built-in one, or a .toml file.
+    of : sequence of str
+        Outputs: columns of ``Motion.columns`` or their beginnings, such as ``"rod.position"``.
+    to : sequence of str
+        Numbers: paths of the scene such as ``"body[rod].mass"``, ``"joint[B].anchor.x"``, ``"gravity.y"``
+        and ``"load[0].stiffness"``; at the start ``"joint[A].angle(0)"``, ``displacement(0)``, ``rate(0)``
+        and ``displacement_rate(0)``.
+    times : sequence of float or ndarray, shape (k,), optional
+        Increasing sample times, s. Default: 101 from 0 to the scene's duration.
+    limits : Limits, optional
+        Tolerances of the runs. Default: a relative tolerance of 1e-12.
+
+    Returns
+    -------
+    Sensitivities
+        Derivatives, with estimated errors.
+
+    Raises
+    ------
+    SceneError
+        If the scene cannot be simulated, or has no number at a path.
+    InputError
+        If an output has no derivative, if the motion does not depend smoothly on a number, if a number moves
+        the time of a switch or opens a loop, or if constraints have intervals.
+    """
+    scene = find_scene(scene)
+    samples = checked_times(np.linspace(0.0, scene.duration, SAMPLES) if times is None else times)
+    if samples[-1] > scene.duration:
+        scene = scene.with_(duration=float(samples[-1]))
+    _refuse(scene, of, to)
+    limits = limits or Limits(rtol=RTOL)
+    model = Model(assembled(scene))
+    if model.m > MOST_ROWS:
+        raise InputError(f"{scene.name}: {model.m} constraint rows; derivatives are for up to {MOST_ROWS}")
+    method = Method.parse(default_method(scene))
+    numbers = _Numbers(scene, model, to)
+    run = Followed.of(scene, model, method, limits, samples, gauss(FIRST_PRECISION.points))
+    first = numbers.derivatives(of, run, FIRST_PRECISION.step)
+    finer = replace(limits, rtol=max(FINEST, FINER * limits.rtol), atol=None)
+    by = Method.parse(f"{SERIES_METHOD}[order={ORDER}]") if method.is_series else method
+    run = Followed.of(scene, model, by, finer, samples, gauss(SECOND_PRECISION.points))
+    second = numbers.derivatives(of, run, SECOND_PRECISION.step)
+    for each in (model, *(variant for number in numbers.of_scene for variant in number.models)):
+        each.release()
+    return _compared(first, second, numbers, samples)
+
+
+def _refuse(scene: Scene, of: Sequence[str], to: Sequence[str]) -> None:
+    """Raise InputError for scenes without derivatives, and for a request without outputs or numbers."""
+    if is_intermittent(scene):
+        raise InputError(f"{scene.name}: constraints with intervals (`active`) have no derivatives here")
+    for name, given in (("of", of), ("to", to)):
+        if isinstance(given, str) or not len(given):
+            raise InputError(f"{name}: needs a list of one name at least")
+
+
+class _Solved(NamedTuple):
+    """Names of the outputs, derivatives (k, outputs, numbers) at the samples reached of a run, and the
+    rounding of their differences."""
+
+    run: Followed
+    outputs: list[str]
+    values: np.ndarray
+    rounding: np.ndarray
+
+
+class _Numbers:
+    """The numbers of a scene and of its start by which its motion is differentiated, by label."""
+
+    def __init__(self, scene: Scene, model: Model, labels: Sequence[str]):
+        self.model, self.labels = model, tuple(labels)
+        self.of_scene = [scene_number(scene, label, model) for label in labels if not is_of_start(label)]
+        self.units = [unit_of_number(scene, label) for label in labels]
+
+    def derivatives(self, of: Sequence[str], run: Followed, step: float) -> _Solved:
+        """Return the derivatives of outputs along a run."""
+        model, motion = self.model, run.motion
+        names = differentiable(motion, of)
+        of_start = [
+            start_number(label, motion, model, run.first, step) for label in self.labels if is_of_start(label)
+        ]
+        every: list[SceneNumber | StartNumber] = [*self.of_scene, *of_start]
+        starts = [(number.x, number.v) for number in every]
+        found = VariationalEquations(model, run, self.of_scene, step).changes(starts)
+        columns, by_label = Columns(motion, names, step), {}
+        for number, along in zip(every, found.along, strict=True):
+            parts = [columns.along(model, found.states, along)]
+            if isinstance(number, SceneNumber):
+                parts.append(columns.by_number(number, found.states))
+            by_label[number.label] = np.sum(parts, axis=0)
+        values, rounding = np.stack([by_label[label] for label in self.labels], axis=-1)
+        return _Solved(run, names, values, rounding)
+
+    def errors(self, values: np.ndarray) -> np.ndarray:
+        """Return the errors (k, o, p) that differences of the scene's arrays and of states leave in
+        derivatives."""
+        relative = {number.label: number.error for number in self.of_scene}
+        share = np.array([DIFFERENCE_ROUNDING + relative.get(label, 0.0) for label in self.labels])
+        return np.asarray(share * np.abs(values).max(axis=0, initial=0.0, keepdims=True))
+
+
+def _compared(first: _Solved, second: _Solved, numbers: _Numbers, samples: np.ndarray) -> Sensitivities:
+    """Return the more accurate derivatives, with the difference of both as their error."""
+    count = min(len(first.values), len(second.values))
+    values = np.full((samples.size, *second.values.shape[1:]), np.nan)
+    errors = values.copy()
+    values[:count] = second.values[:count]
+    difference = np.abs(first.values[:count] - values[:count])
+    errors[:count] = difference + second.rounding[:count] + numbers.errors(values[:count])
+    motion, t = second.run.motion, min(first.run.undecided_from, second.run.undecided_from)
+    outcome, message = motion.outcome, motion.message
+    if count < motion.times.size:
+        outcome = Outcome.UNDECIDED
+        message = f"derivatives end at the singular position at t = {t:.6g} s, where the motion may branch"
+    units = tuple(
+        tuple(f"({UNIT_OF[quantity_of(output)] or 1})/({unit or 1})" for unit in numbers.units)
+        for output in second.outputs
+    )
+    return Sensitivities(
+        samples, tuple(second.outputs), numbers.labels, units, values, errors, outcome, message, motion
+    )

@@ -1,0 +1,197 @@
+"""Derivatives of motions by numbers of their scenes, against closed forms, relations and the judge."""
+
+import json
+
+import numpy as np
+import pytest
+
+import mbref
+from crosscheck.judge.reference.reference import reference
+from mbref.cli import main
+from mbref.scene import Scene
+from mbref.scene.paths import replaced_at
+from tests.helpers.changed_scenes import in_other_units
+from tests.helpers.coupled_mechanisms import body, gear_pair
+from tests.helpers.parts import hinge, slide
+from tests.helpers.powered_mechanisms import powered_mechanism
+
+ACCURATE = 1e-11  # relative error that is allowed against closed forms; rounding leaves 1e-13
+IMAGINARY = 1e-30  # step of the derivative Im f(x + ih)/h of an analytic function, exact to rounding
+GRAVITY, TURN_RATE = 9.81, 3.0  # m/s², rad/s
+CENTRAL = ((1, 4 / 5), (2, -1 / 5), (3, 4 / 105), (4, -1 / 280))  # weights of differences of order 8
+
+
+def slope(function, numbers: dict[str, complex], name: str) -> np.ndarray:
+    """Return the derivative of an analytic function of named numbers."""
+    return np.imag(function(**{**numbers, name: numbers[name] + 1j * IMAGINARY})) / IMAGINARY
+
+
+def assert_close(found: np.ndarray, true: np.ndarray, accuracy: float = ACCURATE) -> None:
+    np.testing.assert_allclose(found, true, rtol=0, atol=accuracy * np.abs(true).max())
+
+
+def pendulum() -> Scene:
+    """Return a compound pendulum that starts at rest."""
+    bob = body("bob", 1.3, [0.05, 0.06, 0.07], (0.3, -0.4, 0.0))
+    joint = [hinge("A", "ground", "bob", (0.0, 0.0, 0.0))]
+    return Scene(name="pendulum", gravity=(0.0, -GRAVITY, 0.0), duration=3.0, body=[bob], joint=joint)
+
+
+def angle_of_pendulum(times, mass, inertia, x, y, gravity, start):
+    """Return φ(t) - φ₀ of sin(φ/2) = k cd(ω t, k), k = sin((φ₀ + start)/2), with Jacobi's cd by means."""
+    length, given = np.sqrt((0.3 - x) ** 2 + (0.4 + y) ** 2), np.arctan((0.3 - x) / (0.4 + y))
+    k = np.sin((given + start) / 2)
+    a, b, ratios = 1.0 + 0j, np.sqrt(1 - k * k), []
+    for _ in range(6):  # c/a squares itself each time
+        a, b, c = (a + b) / 2, np.sqrt(a * b), (a - b) / 2
+        ratios.append(c / a)
+    rate = np.sqrt(-mass * gravity * length / (inertia + mass * length**2))
+    phase = 2 ** len(ratios) * (a * rate * times + np.pi / 2)
+    for ratio in reversed(ratios):
+        phase = (phase + np.arcsin(ratio * np.sin(phase))) / 2
+    return 2 * np.arcsin(k * np.sin(phase)) - given
+
+
+def test_derivatives_of_a_pendulums_angle_equal_those_of_jacobis_function():
+    numbers = {"mass": 1.3, "inertia": 0.07, "x": 0.0, "y": 0.0, "gravity": -GRAVITY, "start": 0.0}
+    paths = ["body[bob].mass", "body[bob].inertia[2]", "joint[A].anchor.x", "joint[A].anchor.y"]
+    times = np.array([0.3, 1.7])
+    found = mbref.sensitivities(pendulum(), ["A.angle"], [*paths, "gravity.y", "joint[A].angle(0)"], times)
+    for k, name in enumerate(numbers):
+        true = slope(lambda **n: angle_of_pendulum(times, **n), numbers, name)
+        assert_close(found.values[:, 0, k], true)
+
+
+SLIDER = slide("D", "ground", "last", (0.9, 0.5, 0.0), (1.0, 0.0, 0.0))
+ROCKER = hinge("D", "ground", "last", (1.0, 0.0, 0.0))
+
+
+def crank_linkage(last: dict) -> Scene:
+    """Return a driven crank and coupler whose pin C carries the last body."""
+    pins = {"A": (0.0, 0.0, 0.0), "B": (0.2, 0.1, 0.0), "C": (0.9, 0.5, 0.0)}
+    bodies = [body(name, 1.0, [0.01, 0.02, 0.02], (0.1, 0.1, 0.0)) for name in ("crank", "coupler", "last")]
+    joints = [hinge("A", "ground", "crank", pins["A"]), hinge("B", "crank", "coupler", pins["B"])]
+    joints += [hinge("C", "coupler", "last", pins["C"]), last]
+    driver = [{"joint": "A", "polynomial": [0.0, TURN_RATE]}]
+    return Scene(name="linkage", duration=1.0, body=bodies, joint=joints, driver=driver)
+
+
+def turned_pin(times, bx, by):
+    angle = TURN_RATE * times
+    return np.cos(angle) * bx - np.sin(angle) * by, np.sin(angle) * bx + np.cos(angle) * by
+
+
+def slid(times, bx, by, cx, cy):
+    """Return the displacement of C on the line y = cy: √(l² - (cy - y_B)²) + x_B - cx."""
+    x, y = turned_pin(times, bx, by)
+    return np.sqrt((cx - bx) ** 2 + (cy - by) ** 2 - (cy - y) ** 2) + x - cx
+
+
+def position_of_rocker(times, bx, by, cx, cy):
+    """Return x of the rocker's centre, which turns with C - D; circles about B and D = (1, 0) meet at C."""
+    x, y = turned_pin(times, bx, by)
+    coupler, rocker = (cx - bx) ** 2 + (cy - by) ** 2, (cx - 1) ** 2 + cy**2
+    apart = (1 - x) ** 2 + y**2
+    along = (coupler - rocker + apart) / (2 * apart)
+    height = np.sqrt(coupler / apart - along**2)
+    px, py = x + along * (1 - x) + height * y - 1, y - along * y + height * (1 - x)
+    cosine, sine = (px * (cx - 1) + py * cy) / rocker, (py * (cx - 1) - px * cy) / rocker
+    return 1 + cosine * (0.1 - 1) - sine * 0.1  # its centre of mass starts at (0.1, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("last", "output", "form"),
+    [(SLIDER, "D.displacement", slid), (ROCKER, "last.position.x", position_of_rocker)],
+    ids=["slider-crank", "four-bar"],
+)
+def test_positions_of_a_driven_linkage_depend_on_pins_as_in_closed_form_and_not_on_masses(last, output, form):
+    """The linkages have redundant rows; no driver's motion depends on a mass."""
+    times = np.array([0.2, 0.5, 0.9])
+    numbers = {"bx": 0.2, "by": 0.1, "cx": 0.9, "cy": 0.5}
+    paths = ["joint[B].anchor.x", "joint[B].anchor.y", "joint[C].anchor.x", "joint[C].anchor.y"]
+    found = mbref.sensitivities(crank_linkage(last), [output], [*paths, "body[last].mass"], times)
+    true = np.array([slope(lambda **n: form(times, **n), numbers, name) for name in numbers]).T
+    assert_close(found.values[:, 0, :4], true)
+    assert np.abs(found.values[:, 0, 4]).max() <= 1e-13  # m/kg: rounding of positions of 1 m
+
+
+def test_angle_of_geared_wheels_depends_on_ratio_and_inertia_as_in_closed_form():
+    """φ = M t²/(2 (I₁ + r² I₂)) with the moment M = 2 N m, I₁ = 0.03 and I₂ = 0.2 kg m², r = -0.5."""
+    times, numbers = np.array([0.5, 2.0]), {"inertia": 0.2, "ratio": -0.5}
+    paths = ["body[wheel].inertia[2]", "coupling[teeth].ratio"]
+    found = mbref.sensitivities(gear_pair(), ["A.angle"], paths, times)
+    for k, name in enumerate(numbers):
+        true = slope(lambda inertia, ratio: times**2 / (0.03 + ratio**2 * inertia), numbers, name)
+        assert_close(found.values[:, 0, k], true)
+
+
+def test_derivative_of_a_conserved_energy_stays_the_one_at_the_start():
+    """∂E/∂g_y = -Σ m y at the start, in a loop with redundant rows whose velocities are given."""
+    scene = mbref.find_scene("planar_slider_crank_gravity")
+    found = mbref.sensitivities(scene, ["energy"], ["gravity.y"], [0.0, 0.1])
+    true = -sum(b.mass * b.position[1] for b in scene.body)
+    np.testing.assert_allclose(found.get("energy", "gravity.y"), true, rtol=ACCURATE)
+
+
+@pytest.mark.slow
+def test_derivative_in_other_units_is_scaled_by_the_units_of_output_and_number():
+    mass, length, time = 8.0, 0.5, 0.25
+    scene, times = powered_mechanism(2), np.array([0.02, 0.05])
+    column, number = f"{scene.body[0].name}.velocity", f"joint[{scene.joint[-1].name}].anchor.x"
+    found = mbref.sensitivities(scene, [column], [number], times).values
+    scaled = mbref.sensitivities(in_other_units(scene, mass, length, time), [column], [number], times * time)
+    assert_close(scaled.values * time, found, 1e-10)  # (m/s)/m; rounding of a mechanism of many rows
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 2])
+def test_derivative_of_a_random_mechanism_equals_differences_of_the_judges_references(seed):
+    """Differences of order 8 of references, which are accurate to 1e-13; couplings and redundant rows."""
+    scene, times, step = powered_mechanism(seed), np.array([0.03]), 0.02
+    name = scene.body[0].name
+    found = mbref.sensitivities(scene, [f"{name}.position"], [f"body[{name}].mass"], times)
+    fields = {field: getattr(scene, field) for field in Scene.model_fields}
+
+    def position(factor):
+        changed = Scene(**replaced_at(fields, f"body[{name}].mass", lambda mass: mass * factor))
+        return reference(changed, times, seconds=60).position[0, 0]
+
+    parts = [weight * (position(1 + k * step) - position(1 - k * step)) for k, weight in CENTRAL]
+    true = sum(parts) / (step * scene.body[0].mass)
+    allowed = 1e-8 * np.abs(true).max() + 1e-11  # m/kg: 1e-13 m of references over the step
+    assert np.abs(found.values[0, :, 0] - true).max() <= allowed
+
+
+@pytest.mark.parametrize(
+    ("scene", "of", "to", "reason"),
+    [
+        (pendulum(), "A.open", "body[bob].mass", "no derivative"),
+        (pendulum(), "A.angle", "body[bob].name", "no number at this path"),
+        (pendulum(), "A.angle", "joint[A].displacement(0)", "no joint 'A' with this coordinate"),
+        (crank_linkage(ROCKER), "B.angle", "joint[B].axis.x", "cannot stay closed"),
+    ],
+    ids=["output", "text", "coordinate", "tilted hinge of a planar loop"],
+)
+def test_output_or_number_without_a_derivative_is_refused_by_name(scene, of, to, reason):
+    with pytest.raises((mbref.InputError, mbref.SceneError), match=reason):
+        mbref.sensitivities(scene, [of], [to], [0.1])
+
+
+def test_derivatives_end_undecided_at_a_singular_position():
+    """The parallelogram swings through its flat position, where another branch begins."""
+    found = mbref.sensitivities("four_bar_gravity", ["A.angle"], ["gravity.y"], [0.05, 0.3])
+    assert found.outcome is mbref.Outcome.UNDECIDED
+    assert np.isfinite(found.values[0]).all()
+    assert np.isnan(found.values[1]).all()
+
+
+def test_command_prints_and_writes_the_derivatives_of_the_function(tmp_path, capsys):
+    path, out, of, to = tmp_path / "pendulum.toml", tmp_path / "found.csv", "energy", "joint[A].rate(0)"
+    pendulum().save(path)
+    request = ["--of", of, "--to", to, "--times", "0.1,0.4", "--out", str(out), "--json"]
+    assert main(["sensitivities", str(path), *request]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    found = mbref.sensitivities(path, [of], [to], [0.1, 0.4])
+    assert printed["values"] == found.values.tolist()
+    assert printed["units"] == [["(J)/(rad/s)"]]
+    assert np.loadtxt(out, delimiter=",", skiprows=1)[:, 1].tolist() == found.get(of, to).tolist()
