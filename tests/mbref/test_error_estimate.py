@@ -213,22 +213,27 @@ def test_estimate_with_missing_samples_is_read_back_equal_from_its_json_text():
         assert getattr(read, field) == getattr(written, field), field
 
 
-def test_command_prints_the_estimate_unless_the_option_forbids_it(capsys, pendulums, tmp_path):
-    """The table has the estimate of --json in two digits, and the warning; with --estimate no there is
-    neither."""
-    path = tmp_path / "pendulums.toml"
+def ran(pendulums: Scene, folder, capsys, *options: str) -> str:
+    """Return the output of a run of the pendulums with rtol 1e-4."""
+    path = folder / "pendulums.toml"
     pendulums.save(path)
-    command = ["run", str(path), "--rtol", "1e-4"]
-    assert main(command) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    assert "sensitive motion: error about" in said
+    assert main(["run", str(path), "--rtol", "1e-4", *options]) == 0
+    return capsys.readouterr().out
+
+
+def test_command_prints_the_estimate_of_its_json_record_and_warns(capsys, pendulums, tmp_path):
+    """The table has the estimate in two digits."""
+    said = " ".join(ran(pendulums, tmp_path, capsys).split())
+    record = json.loads(ran(pendulums, tmp_path, capsys, "--json"))["records"][0]
     [printed] = re.findall(r"largest estimated error: ([-+.\de]+)", said)
-    assert main([*command, "--json"]) == 0
-    record = json.loads(capsys.readouterr().out)["records"][0]
-    assert "sensitive motion" in record["message"] and record["error_estimate"]["largest"] > 0.1
     assert float(printed) == pytest.approx(record["error_estimate"]["largest"], rel=0.06)  # two digits
-    assert main([*command, "--json", "--estimate", "no"]) == 0
-    record = json.loads(capsys.readouterr().out)["records"][0]
+    assert record["error_estimate"]["largest"] > 0.1
+    assert "sensitive motion: error about" in said and "sensitive motion" in record["message"]
+
+
+def test_record_of_a_command_with_estimate_no_has_neither_estimate_nor_warning(capsys, pendulums, tmp_path):
+    """The motion is sensitive, so that an estimate would warn."""
+    record = json.loads(ran(pendulums, tmp_path, capsys, "--json", "--estimate", "no"))["records"][0]
     assert record["error_estimate"] is None and record["message"] == ""
 
 

@@ -51,11 +51,16 @@ def expecting(checks, tmp_path) -> OwnLimits:
     return written(tmp_path, "".join(entries))
 
 
-def test_expected_failures_do_not_count_and_passes_of_them_fail(right, wrong, tmp_path):
-    """The planted fault's failures are expected; the engine without it then fails with the remedy."""
+def test_expected_failures_do_not_count(right, wrong, tmp_path):
+    """An engine with twice the gravity fails checks of a free fall, which the file of limits expects."""
     assert right.conforms and not wrong.conforms
     limits = expecting({verdict.property for verdict in failed(wrong)}, tmp_path)
     assert verify(HEAVY, limits).conforms
+
+
+def test_checks_that_pass_although_they_are_expected_to_fail_fail_with_the_remedy(right, wrong, tmp_path):
+    """The engine without the planted fault passes the checks that the file expects to fail."""
+    limits = expecting({verdict.property for verdict in failed(wrong)}, tmp_path)
     strict = [limits.judged(verdict) for verdict in right.verdicts]
     assert {v.property for v in strict if v.status == suite.FAIL} == {v.property for v in failed(wrong)}
     assert all("remove it from the file" in v.reason for v in strict if v.status == suite.FAIL)
@@ -75,8 +80,7 @@ def test_own_limit_replaces_the_limit_of_a_check_on_its_scenes(right, wrong, tmp
 
 def test_failure_no_worse_than_in_the_baseline_does_not_count(right, wrong, tmp_path):
     """The record of the faulty engine excuses it; a value of three times as much, and the record of the right
-    engine do not. A file of another form, with a text for a number, or with
-    contradicting verdicts is refused."""
+    engine do not."""
     for name, found in (("wrong", wrong), ("right", right)):
         (tmp_path / f"{name}.json").write_text(json.dumps(found.to_record()))
     before = OwnLimits(baseline=read_baseline(tmp_path / "wrong.json"))
@@ -86,15 +90,25 @@ def test_failure_no_worse_than_in_the_baseline_does_not_count(right, wrong, tmp_
     passed = OwnLimits(baseline=read_baseline(tmp_path / "right.json"))
     known = [v for v in failed(wrong) if v.property != "run"]
     assert known and all("passes in the baseline" in passed.judged(v).reason for v in known)
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "said"),
+    [
+        (None, "is not a file that crosscheck verify --json printed"),
+        ([{"measured": "1"}], "verdicts.0.measured: "),
+        ([{"status": "pass"}, {"status": "fail"}], "has two"),
+    ],
+    ids=["another form", "text for a number", "contradicting verdicts"],
+)
+def test_damaged_baseline_is_refused_with_its_fault(wrong, verdicts, said, tmp_path):
+    """The first verdict of the record is changed, or is there twice; None stands for an empty record."""
     whole = wrong.to_record()
-    for damaged, said in [
-        ({}, "is not a file that crosscheck verify --json printed"),
-        (whole | {"verdicts": [whole["verdicts"][0] | {"measured": "1"}]}, "verdicts.0.measured: "),
-        (whole | {"verdicts": [whole["verdicts"][0] | {"status": s} for s in ("pass", "fail")]}, "has two"),
-    ]:
-        (tmp_path / "wrong.json").write_text(json.dumps(damaged))
-        with pytest.raises(RecordsError, match=said):
-            read_baseline(tmp_path / "wrong.json")
+    changed = [whole["verdicts"][0] | change for change in verdicts or ()]
+    damaged = {} if verdicts is None else whole | {"verdicts": changed}
+    (tmp_path / "damaged.json").write_text(json.dumps(damaged))
+    with pytest.raises(RecordsError, match=said):
+        read_baseline(tmp_path / "damaged.json")
 
 
 def test_scenes_after_the_time_budget_are_named_and_conform_to_nothing():

@@ -45,11 +45,15 @@ def test_scene_at_a_time_without_sample_is_refused_with_the_nearest_one(crank):
         crank.scene_at(0.03)
 
 
-def test_motion_is_a_dictionary_of_its_bodies_and_equal_to_itself_only(crank):
-    """Names of bodies complete in IPython. Motions of bodies and joints are equal to themselves only, too."""
+def test_motion_is_a_dictionary_of_its_bodies(crank):
+    """IPython completes the names of bodies by ``_ipython_key_completions_``."""
     assert list(crank) == ["crank", "rod", "slider"] and len(crank) == 3
     assert "rod" in crank and "lid" not in crank and 0 not in crank
     assert crank._ipython_key_completions_() == list(crank)
+
+
+def test_motion_and_its_parts_are_equal_to_themselves_only(crank):
+    """A motion of equal numbers is another motion; so are two objects of one body."""
     again = mbref.Motion.of(crank.mechanism, crank)
     assert crank in (crank,) and crank != again and len({crank, again, crank}) == 2
     assert crank["rod"] != crank["rod"] and len({crank.joint("A"), crank["rod"]}) == 2
