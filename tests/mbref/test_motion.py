@@ -119,14 +119,6 @@ def test_plot_has_a_panel_for_each_quantity(crank):
     assert (axes[1].lines[0].get_ydata() == crank.joint("A").angle).all()
 
 
-def test_plot_of_an_unknown_column_suggests_a_known_one(crank):
-    with pytest.raises(ValueError, match=r"no column 'slider\.colour'"):
-        crank.plot("slider.colour")
-    for misspelt, suggested in (("slidr.position", "slider.position"), ("enrgy", "energy")):
-        with pytest.raises(ValueError, match=f"'; did you mean '{suggested}'\\?$"):
-            crank.plot(misspelt)
-
-
 def test_plot_without_columns_shows_joint_coordinates_and_energy(crank):
     """``grouped`` returns the columns of each panel, by its quantity."""
     groups = grouped(list(crank.columns())[1:], ())
