@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from crosscheck.engines.shared.spanning_tree import GROUND_LINK, Link, Tree, effective_mass, spanning_tree
 from mbref import rotations
 from mbref.scene import JOINT_TYPES, Body, Distance, Driver, Scene
-from mbref.scenes import SCENES
 from tests.crosscheck.tree_scenes import INERTIA, body, every_joint, ring
 from tests.helpers.parts import X, block, hinge, joint
 
@@ -156,7 +155,6 @@ def test_a_rod_takes_less_than_half_of_the_effective_mass_at_its_ends() -> None:
 
 
 SOLVED = 1e-11  # of the largest velocity, and at least 1e-11 m/s: rounding of a linear system of 100 rows
-SCENE_LIST = [*SCENES, "every_joint", "driven", "ring_universal"]
 
 
 @given(graphs(), st.sampled_from([(), ("spherical", "revolute")]))

@@ -121,9 +121,3 @@ def arm(driver: tuple[Driver, ...] = ()) -> Scene:
 def driven_arm() -> Scene:
     """The arm with a driver that follows a table and a sine."""
     return arm((Driver(joint="R", table=WAVY, sine=Sine(amplitude=0.2, frequency=3.0)),))
-
-
-def driven_wheel() -> Scene:
-    """A wheel whose angle is a table of a cubic polynomial that begins at zero."""
-    driver = Driver(joint="J", polynomial=(-float(CUBIC(0.0)),), table=TABLE)
-    return wheel().with_(driver=[driver], load=[])

@@ -72,17 +72,6 @@ def test_prescribed_motion_does_not_depend_on_the_tolerance():
     assert relative_error(rough, scene) < ROUNDING
 
 
-def test_driven_run_by_series_of_lower_order_takes_more_steps_for_one_accuracy():
-    """The closed form is met to rounding with each order."""
-    scene = SCENES["four_bar"]()
-    steps = {}
-    for order in (10, 12, 24):
-        run = simulate(scene, f"taylor[order={order}]", np.linspace(0.0, 0.05, 3))
-        assert relative_error(run, scene) < ROUNDING
-        steps[order] = run.cost.steps
-    assert steps[10] > steps[12] > steps[24]
-
-
 def elbow(crank, sign):
     """Return where coupler and rocker, both 0.5 m, meet: from the crank's end (k, 2) and a ground link of
     0.5 m, on one side."""

@@ -103,12 +103,6 @@ def test_variant_depends_on_its_seed_and_number_alone_and_differs_in_nothing_els
     assert next(variants(DRIVEN, VARY, 1, seed=4)) != scenes[0]
 
 
-def test_two_numbers_of_one_body_vary_within_their_bounds():
-    varied = [Variation("body[slider].mass", 2.0, 3.0), Variation("body[slider].position[2]", 0.1, 0.2)]
-    (scene,) = variants(DRIVEN, varied, 1)
-    assert 2.0 <= scene.body[2].mass <= 3.0 and 0.1 <= scene.body[2].position[2] <= 0.2
-
-
 @pytest.mark.parametrize(
     ("text", "says"),
     [

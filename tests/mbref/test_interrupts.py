@@ -32,12 +32,6 @@ def test_interrupt_lost_during_a_compilation_is_raised_at_its_end():
     assert done == ["lost", "compiled"] and signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_handler_of_python_is_back_after_a_compilation_without_interrupt():
-    with interrupts_kept():
-        pass
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-
-
 def test_interrupt_that_is_not_lost_ends_the_compilation_at_once():
     done = []
     with pytest.raises(KeyboardInterrupt), interrupts_kept():

@@ -187,13 +187,6 @@ def test_command_plot_writes_png_and_svg(tmp_path):
     assert "<svg" in picture.with_suffix(".svg").read_text()
 
 
-def test_command_plot_suggests_the_column_nearest_to_an_unknown_one(tmp_path, capsys):
-    path = str(tmp_path / "my.toml")
-    pendulum().save(path)
-    assert main(["plot", path, "A.angel", "--samples", "5"]) == 2
-    assert "did you mean 'A.angle'?" in capsys.readouterr().err
-
-
 def test_gif_of_a_short_motion_plays_four_seconds(tmp_path):
     """A motion of 1 s, slowed to 4 s: the frames' durations (ms) in the file add up to it."""
     from PIL import Image

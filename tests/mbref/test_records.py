@@ -13,7 +13,7 @@ import pytest
 
 from mbref import records
 from mbref.cli import main
-from mbref.records import RecordsError, append, stored, strict_json
+from mbref.records import RecordsError, append, stored
 
 NO_DISK = pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no /dev/full")
 
@@ -140,7 +140,3 @@ def test_five_killed_writers_leave_every_record_once_and_in_order(tmp_path: Path
     found = stored(path)
     lines = [json.loads(line)["key"] for line in path.read_text().splitlines()]
     assert len(found) >= 5 * 50_000 // 6000 and lines == list(found) == [str(k) for k in range(len(found))]
-
-
-def test_json_text_has_no_nan_and_no_infinity():
-    assert strict_json({"a": (1, math.nan), "b": [math.inf]}) == '{"a": [1, null], "b": [1e999]}'

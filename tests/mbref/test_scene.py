@@ -88,10 +88,6 @@ def faults_of(data):
     return caught.value.faults
 
 
-def test_valid_scene_has_no_fault():
-    assert Scene(**VALID).joint[0].type == "revolute"
-
-
 @pytest.mark.parametrize(("path", "value", "reported"), FAULTS)
 def test_fault_is_reported_once_under_its_path(path, value, reported):
     """A renamed joint or body also breaks the entries that refer to it; they have faults of their own."""

@@ -6,7 +6,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from crosscheck.conformance.changes.replays import started
-from crosscheck.conformance.strategies import matrices, mechanisms, paper_mechanisms
+from crosscheck.conformance.strategies import matrices, mechanisms
 from crosscheck.conformance.trial import difference
 from crosscheck.judge.constraints import initial_poses, jacobian, scene_length
 from crosscheck.judge.energy import energy_series
@@ -112,16 +112,6 @@ def test_random_scene_has_velocities_that_its_joints_allow(scene):
     rows, _ = jacobian(scene, 0.0, *pose)
     twists = np.array([[*body.velocity, *body.angular_velocity] for body in scene.body]).ravel()
     assert np.abs(rows @ twists).max(initial=0.0) < 1e-12 * max(1.0, np.abs(twists).max()), scene
-
-
-@settings(max_examples=6)
-@given(paper_mechanisms(("planar_slider_crank", "spatial_slider_crank")))
-def test_paper_s_mechanisms_with_random_masses_balance_their_reactions(scene):
-    """The judge's balances of Newton and Euler of every body with the reactions, to 10 000 rtol, and
-    constraints to 100 rtol."""
-    motion = run(scene.with_(duration=0.005))
-    assert balance(scene, motion, motion) < 1e-6, scene
-    assert float(violation_series(scene, motion).max()) < 1e-8, scene
 
 
 @given(st.integers(0, 5), st.data())

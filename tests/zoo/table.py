@@ -12,7 +12,6 @@ from reports.markdown import body
 from tests.zoo.defects import DEFECTS
 
 FOR_REPORTS = Path(suite.__file__).with_name("proved_by.toml")
-CAPTION = "Planted defects."
 HEADER = ("check", "what it checks", "defects")
 HEAD = f"""# Conformance checks
 

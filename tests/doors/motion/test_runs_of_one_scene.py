@@ -5,9 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from mbref import diagnose, find_scene, simulate
-from mbref.ensembles.simulate_all import simulate_all
-from mbref.stepping.limits import Limits
+from mbref import find_scene, simulate
 
 METHODS = ["taylor", "lm2+projection/dop853", "mpi-svd+partitioning/dop853"]
 TIMES = np.linspace(0.0, 0.05, 3)
@@ -52,16 +50,6 @@ def test_changed_copy_moves_by_its_own_numbers(copy):
     assert np.array_equal(
         found, simulate(find_scene(scene.name).with_(name="copy", **change), times=TIMES).position
     )
-
-
-def test_positions_of_a_scene_in_an_ensemble_are_equal_to_its_run_alone():
-    """Four masses of the rod run alone, one is diagnosed, and then all run together: equal to the bit."""
-    scene = find_scene("planar_slider_crank_gravity")
-    variants = [scene, *(scene.with_("body[rod].mass", mass) for mass in (0.5, 0.6, 0.7))]
-    alone = [simulate(each.with_(name="alone"), "taylor", TIMES).position for each in variants]
-    diagnose(scene)
-    together = simulate_all(variants, "taylor", TIMES, Limits())
-    assert all(np.array_equal(one, motion.position) for one, motion in zip(alone, together, strict=True))
 
 
 def test_scene_has_no_negative_zero():

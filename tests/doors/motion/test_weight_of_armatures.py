@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from mbref import Limits, Scene, equilibria, simulate
-from mbref.ensembles.simulate_all import simulate_all
 from mbref.formulations import FORMULATIONS
 from mbref.stabilisation import STABILISATIONS
 from tests.helpers import parts
@@ -68,14 +67,6 @@ def test_armature_of_a_slide_has_no_weight_in_generated_code():
     scene = slide()
     motion = simulate(scene, "taylor", TIMES, Limits(code="generated"))
     assert off(motion.joint("G").displacement, fallen(scene)) < STEPS
-
-
-def test_slides_with_armature_of_a_batch_fall_by_their_own_gravity():
-    """The displacement is s = ½ m (g·a) / (m + I) t² with each scene's g."""
-    scenes = [slide(gravity) for gravity in GRAVITIES for _ in range(2)]
-    for scene, found in zip(scenes, simulate_all(scenes, "taylor", TIMES, Limits()), strict=True):
-        moved = found.position[:, 0] - scene.body[0].position
-        assert off(moved @ scene.joint[0].axis, fallen(scene)) < STEPS
 
 
 def test_equilibrium_of_a_slide_on_a_spring_has_the_weight_of_its_mass_alone():

@@ -13,7 +13,6 @@ import mbref
 from crosscheck.judge.constraints import coupling_gaps
 from crosscheck.judge.energy import energy_series
 from mbref.cli import main
-from mbref.ensembles.simulate_all import simulate_all
 from mbref.scene import Scene
 from tests.helpers.coupled_mechanisms import gear_pair
 from tests.helpers.parts import hinge
@@ -130,18 +129,6 @@ def test_run_file_table_and_json_have_the_angle_with_its_full_turns(tmp_path, ca
     assert main(["run", str(path), "--times", str(END), "--json"]) == 0
     record = json.loads(capsys.readouterr().out)["records"][0]
     assert record["angles"]["H"] == pytest.approx([expected])
-
-
-def test_angle_of_each_scene_of_a_batch_counts_its_full_turns():
-    """φ = 40 (1 - cos √(k / I) t) for three stiffnesses k; at a tolerance of 1e-9 the run is off by less than
-    1e-7."""
-    scenes = [wound_wheel().with_("load[0].stiffness", k) for k in (9.0, STIFFNESS, 20.0)]
-    for scene, motion in zip(
-        scenes, simulate_all(scenes, "taylor", np.array([END]), mbref.Limits()), strict=True
-    ):
-        frequency = math.sqrt(scene.load[0].stiffness / INERTIA)
-        angle = NATURAL * (1.0 - math.cos(frequency * END))
-        assert motion.joint("H").angle[0] == pytest.approx(angle, rel=1e-7)
 
 
 def test_angle_of_an_engine_without_turns_is_nan_where_its_samples_are_too_far_apart():
