@@ -89,24 +89,26 @@ def test_record_whose_parts_do_not_fit_is_named(field, value, said, tmp_path, ca
 LACKING = b'{"key": "k1", "scene": "four_bar"}\n'
 
 
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [
-        *(
-            (name, LACKING)
-            for name in ("timings.jsonl", "truths.jsonl", "motions.jsonl", "conformance/x.json")
-        ),
-        *(("conformance/x.json", content) for content in (b"{", b"[" * 100_000, b"\xff\xfe\x00")),
-    ],
-    ids=lambda value: ascii(value[:9]),
-)
-def test_faulty_file_beside_right_records_is_named(name, content, tmp_path, capsys):
-    """Its line has only a key and a scene, or it is no JSON."""
+BESIDE = {  # faulty content of a file beside right records, and words of the fault
+    "no numbers in timings": ("timings.jsonl", LACKING, "record 'k1': seconds: field required"),
+    "no truth": ("truths.jsonl", LACKING, "record 'k1': kind: field required"),
+    "no motion": ("motions.jsonl", LACKING, "record 'k1': engine: field required"),
+    "no verdicts": ("conformance/x.json", LACKING, "record 'k1': engine: field required"),
+    "brace alone": ("conformance/x.json", b"{", "is not JSON"),
+    "brackets too deep": ("conformance/x.json", b"[" * 100_000, "is not JSON"),
+    "bytes that are no text": ("conformance/x.json", b"\xff\xfe\x00", "is not JSON"),
+}
+
+
+@pytest.mark.parametrize(("name", "content", "says"), BESIDE.values(), ids=BESIDE)
+def test_faulty_file_beside_right_records_is_named_with_its_fault(name, content, says, tmp_path, capsys):
+    """LACKING is a line with only a key and a scene."""
     place = folder(tmp_path / "r", record_with("seed", 0))
     (place / name).parent.mkdir(exist_ok=True)
     (place / name).write_bytes(content)
     assert report(["--render", str(place)]) == 2
-    assert name in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert name in said and says in said and said.count("\n") == 1
 
 
 GROUP = {

@@ -99,11 +99,11 @@ def test_linkage_that_locks_into_a_truss_comes_to_rest(truss):
     assert np.ptp(truss.position[3:], axis=0).max() <= ROUNDING
 
 
-def test_hinges_of_a_locked_truss_carry_its_weight_and_share_forces_across_the_plane(truss):
-    """A and C carry 2 kg · 9.81 m/s². Hinges of a planar truss have redundant rows across the plane: their
-    impulses are open, and the forces of least norm are zero there."""
+def test_hinges_of_a_locked_truss_carry_its_weight(truss):
+    """A and C carry 2 kg · 9.81 m/s² at rest. While C is open, at 0.2 s, it carries nothing. Parallel hinges
+    have redundant rows, so that their impulses are not determined (open)."""
     _, locked = truss.events
-    assert all(locked.open.values()) and np.allclose(truss.joint("C").force[2], 0.0)
+    assert all(locked.open.values()) and not truss.joint("C").force[2].any()
     weight = np.array([0.0, 2.0 * 9.81, 0.0])
     assert np.allclose((truss.joint("A").force + truss.joint("C").force)[-1], weight, rtol=0, atol=1e-9)  # N
 
