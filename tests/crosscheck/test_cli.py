@@ -213,7 +213,8 @@ def test_run_takes_a_method_and_a_tolerance_that_no_sweep_offers(capsys, still):
 def test_an_unknown_method_is_refused_with_the_known_ones(capsys, still):
     status, _, err = run_main(capsys, "run", still, "--engine", "mbref", "--method", "lm9+none")
     assert status == 2, (status, err)
-    assert "unknown method or setting 'lm9+none'; known: 'taylor', 'alf-dual+projection', " in err, err
+    assert "unknown method or setting 'lm9+none'; known: 'taylor', " in err, err
+    assert "'alf-dual+projection', " in err, err
 
 
 @pytest.mark.parametrize("what", ["scenes", "engines", "methods", "settings", "metrics"])

@@ -50,7 +50,7 @@ class Modelled:
             "outcome": "COMPLETED" if h <= longest else "NOT_FINITE",
             "t_end": 1.0,
             "metrics": {"error": factor * h**order, "error_bound": 1e-14},
-            "cost": {"seconds": cost / h, "rhs": 1 / h},
+            "cost": {"seconds": cost / h, "rhs": round(1 / h)},
         }
 
     def cases(self, *steps: float) -> list[Case]:
@@ -105,7 +105,7 @@ def test_no_coarser_step_is_tried_that_costs_as_much():
 
 def _bounded(record: dict[str, Any]) -> dict[str, Any]:
     seconds = max(record["cost"]["seconds"], 1e-2)
-    return {**record, "cost": {"seconds": seconds, "rhs": max(record["cost"]["rhs"], 10.0)}}
+    return {**record, "cost": {"seconds": seconds, "rhs": max(record["cost"]["rhs"], 10)}}
 
 
 def test_family_more_expensive_than_the_cheapest_is_abandoned():

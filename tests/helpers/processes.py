@@ -10,8 +10,11 @@ def is_gone(process: int) -> bool:
     """Return whether a process ends within PATIENCE."""
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
-        status = Path(f"/proc/{process}/stat")
-        if not status.exists() or status.read_text().rsplit(")", 1)[1].split()[0] == "Z":
+        try:
+            state = Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0]
+        except (FileNotFoundError, ProcessLookupError):  # the second: it ended while it was read
+            return True
+        if state == "Z":  # it ended, and its parent has not asked for its status yet
             return True
         time.sleep(0.02)
     return False

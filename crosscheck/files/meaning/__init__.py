@@ -6,6 +6,7 @@ compiler, so that MuJoCo's compiled model is the meaning of an MJCF file.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -48,7 +49,8 @@ def meant(path: Path, form: str) -> Machine:
 
 def _too_large(machine: Machine) -> Iterator[str]:
     """Yield numbers whose products exceed floating-point numbers; a limit of a joint multiplies nothing."""
-    for part in (*machine.bodies, *machine.joints, *(machine.loops or ()), *(machine.couplings or ())):
+    parts: tuple[Any, ...] = (machine.bodies, machine.joints, machine.loops or (), machine.couplings or ())
+    for part in itertools.chain.from_iterable(parts):
         for name, value in vars(part).items():
             largest = max(_sizes(value), default=0.0)
             if largest > LARGEST and name not in ("lower", "upper"):

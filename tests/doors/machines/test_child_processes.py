@@ -30,8 +30,8 @@ sys.stdin.read()
 PROGRAM = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell ignores it in jobs in the background
-from crosscheck.cli.rendering import rendered
-sys.exit(rendered(sys.argv[1:]))
+from crosscheck.processes.program import run_program
+sys.exit(run_program("waiting_module", sys.argv[1:]))
 """
 WAITING = """
 import os, signal, subprocess, sys, time
@@ -91,9 +91,9 @@ def test_processes_of_an_engine_end_with_a_parent_that_ends_or_is_killed(engine:
 
 def parent_ended_by(number: signal.Signals, folder: Path) -> tuple[int, int, int]:
     """Return the exit status of a parent that a signal ends, and the numbers of the program that it runs and
-    of the process that the program has started. The parent runs the program ``reports``, as the command
-    `crosscheck report` does; in this folder the program waits."""
-    (folder / "reports.py").write_text(WAITING)
+    of the process that the program has started. The parent runs the program as `crosscheck report` runs its
+    own."""
+    (folder / "waiting_module.py").write_text(WAITING)
     environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{folder}"}
     command = [sys.executable, "-c", PROGRAM, "--option"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment, cwd=folder) as parent:
@@ -113,10 +113,10 @@ def test_program_and_its_processes_end_when_sigkill_ends_the_parent(tmp_path: Pa
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_signal_to_the_parent_ends_the_program_whose_exit_status_the_parent_returns(number, tmp_path: Path):
-    """As in a shell, the status of a program that the signal n ends is 128 + n."""
+    """A program that a signal n ends has the status -n, which is 256 - n in a byte."""
     status, program, started = parent_ended_by(number, tmp_path)
     os.kill(started, signal.SIGKILL)
-    assert is_gone(program) and status == 128 + number
+    assert is_gone(program) and status == 256 - number
 
 
 @pytest.mark.slow
