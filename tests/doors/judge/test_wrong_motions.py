@@ -277,7 +277,7 @@ def test_gate_names_the_field_that_differs_and_twice_the_difference_has_twice_th
     assert gate(make(), [run, replace(run, engine="other")]) is None
     once, twice = by_gate(make, field, 1), by_gate(make, field, 2)
     assert once.field == twice.field == field and once.engines == ("truth", "other")
-    assert twice.by == pytest.approx(2 * once.by, rel=1e-6)  # rounding of 1e-10 of positions of 1e-4 lengths
+    assert twice.by == pytest.approx(2 * once.by, rel=1e-6)  # rounding of a small difference
 
 
 def test_gate_states_a_difference_of_positions_in_lengths_of_the_mechanism():
