@@ -122,8 +122,8 @@ def test_component_is_determined_where_the_judge_finds_no_open_wrench(name):
 
 
 def test_only_in_plane_reactions_of_a_planar_four_bar_are_determined(capsys, tmp_path):
-    """Four parallel hinges: force x, force y and moment z; three rows more than the motion needs act
-    across."""
+    """Four parallel hinges: force x, force y and moment z; three rows more than the motion needs act across.
+    The command diagnose prints them."""
     hinges = [
         j.model_dump() | {"type": "revolute", "axis": (0.0, 0.0, 1.0)} for j in find_scene("four_bar").joint
     ]
