@@ -12,6 +12,7 @@ from mbref.simulation import VERSION
 
 if TYPE_CHECKING:
     from mbref.design.along_motion import AlongMotion, along_motion
+    from mbref.design.derivatives.fit import Fit, fit
     from mbref.design.derivatives.result import Sensitivities
     from mbref.design.derivatives.sensitivities import sensitivities
     from mbref.design.diagnosis import Diagnosis, diagnose
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
 __version__ = VERSION
 
 _PUBLIC = {  # module → its public names
+    "design.derivatives.fit": ("Fit", "fit"),
     "design.derivatives.result": ("Sensitivities",),
     "design.derivatives.sensitivities": ("sensitivities",),
     "design.along_motion": ("AlongMotion", "along_motion"),
@@ -75,6 +77,7 @@ __all__ = [
     "Diagnosis",
     "Equilibrium",
     "ErrorEstimate",
+    "Fit",
     "InputError",
     "Limits",
     "Matrices",
@@ -96,6 +99,7 @@ __all__ = [
     "equilibria",
     "exchanges",
     "find_scene",
+    "fit",
     "idle_freedoms",
     "motion_of_mode",
     "plot",

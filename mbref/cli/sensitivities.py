@@ -1,4 +1,4 @@
-"""mbref sensitivities: derivatives of outputs of a motion with respect to numbers of the scene."""
+"""mbref sensitivities and mbref fit: derivatives of motions by numbers of a scene, and their estimation."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ENDINGS = (".npz", ".json", ".csv")
 
 
 def add(commands: Any) -> None:
-    """Add the parser of the command."""
+    """Add the parsers of both commands."""
     command = commands.add_parser(
         "sensitivities",
         action=_sensitivities,
@@ -44,6 +44,25 @@ def add(commands: Any) -> None:
     )
     add_output(command, "--out", metavar="FILE", help="write all samples: .npz, .json or .csv")
     command.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+
+    match = commands.add_parser(
+        "fit",
+        action=_fit,
+        help="numbers of a scene from measured columns of its motion",
+        description="Least squares over numbers of a scene, by exact derivatives: finds the motion that is\n"
+        "nearest to measured columns, each relative to its deviation. Prints the numbers with standard\n"
+        "errors, and the combinations of numbers that the columns do not determine.",
+        epilog="example:\n"
+        "  mbref fit my.toml run.csv --free 'body[rod].mass' --free 'joint[B].anchor.x' --out fitted.toml",
+    )
+    add_scene(match)
+    match.add_argument("measured", metavar="FILE.csv", help="time and columns (mbref list outputs), SI units")
+    match.add_argument(
+        "--free", action="append", required=True, metavar="NUMBER", help="number to fit; may be repeated"
+    )
+    match.add_argument("--of", metavar="NAME,…", help="columns to use, or their beginnings (default: all)")
+    add_output(match, "--out", metavar="FILE.toml", help="write the scene with the fitted numbers")
+    match.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
 
 
 def _sensitivities(options: argparse.Namespace) -> int:
@@ -85,3 +104,27 @@ def _show(found: Sensitivities) -> None:
             value, error = found.values[known[-1], o, p], found.errors[known[-1], o, p]
             table.add_row(output, parameter, f"{value:.12g}", f"{error:.1e}", found.units[o][p])
     console().print(table)
+
+
+def _fit(options: argparse.Namespace) -> int:
+    from mbref.design.derivatives.fit import fit
+
+    if options.out and not options.out.endswith(".toml"):
+        raise InputError(f"--out: must end in .toml, got {options.out!r}")
+    of = options.of.split(",") if options.of else None
+    found = fit(options.scene, options.measured, options.free, of)
+    if options.out:
+        found.scene.save(options.out)
+    if options.json:
+        print(strict_json(found.to_record()))
+        return 0 if found.converged else 1
+    lines = [
+        f"{name} = {x:.9g}, standard error {found.errors[name]:.2g}" for name, x in found.numbers.items()
+    ]
+    for combination in found.undetermined:
+        parts = " ".join(f"{weight:+.3g} ({name})" for name, weight in combination.items())
+        lines.append(f"not determined, in relative changes: {parts}")
+    lines += [f"root mean square residual of {name}: {x:.3g}" for name, x in found.deviations.items()]
+    lines += ["the iteration ended before a minimum"] * (not found.converged)
+    console().print("\n".join(lines), soft_wrap=True)
+    return 0 if found.converged else 1

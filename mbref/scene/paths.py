@@ -1,4 +1,4 @@
-"""Paths to the fields of a scene, such as ``body[rod].mass`` or ``joint[0].anchor[1]``."""
+"""Paths to the fields of a scene, such as ``body[rod].mass``, ``joint[0].anchor[1]`` or ``gravity.y``."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 from mbref.scene.fields import meant
 from mbref.scene.validation import SceneError
 
+COMPONENTS = ("x", "y", "z")  # of a vector
 PATH_STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[([^\]]+)\]")
 
 
@@ -55,11 +56,13 @@ def _fields_of(value: Any) -> Mapping[str, Any]:
 def _place(entries: tuple[Any, ...], step: str, path: str) -> int:
     """Return the index for a step of a path: a number, or the name of the entry (for a driver its joint's
     name)."""
-    tables = map(_fields_of, entries)
+    tables = [*map(_fields_of, entries)]
     names = [table.get("name", table.get("joint")) for table in tables]
     if step in names:
         return names.index(step)
     if step.isdigit() and int(step) < len(entries):
         return int(step)
+    if step in COMPONENTS and len(entries) == len(COMPONENTS) and not any(tables):
+        return COMPONENTS.index(step)
     named = [name for name in names if isinstance(name, str)]
     raise SceneError([f"{path}: the scene has no {step!r} there{meant(step, named)}"])

@@ -56,6 +56,8 @@ class Followed:
         if not states.times.size:
             raise InputError(f"{scene.name}: {motion.message}")
         undecided = min((crossing.time for crossing in motion.crossings or ()), default=np.inf)
+        if len(set(TangentRows(model, states.at([0, -1])).ranks)) > 1:
+            undecided = 0.0  # the motion starts at a singular position
         reached = samples[(samples < undecided) & (samples <= states.times[-1])]
         last = float(reached.max(initial=0.0))
         freedoms = model.n - TangentRows(model, states.at(slice(0, 1))).rank

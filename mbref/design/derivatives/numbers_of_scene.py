@@ -10,7 +10,6 @@ import itertools
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -39,7 +38,6 @@ UNITS = {  # by field
 }
 UNITS_OF_TURNS = {"stiffness": "N m/rad", "damping": "N m s/rad", "armature": "kg m²"}
 UNITS_OF_SLIDES = {"stiffness": "N/m", "damping": "N s/m", "armature": "kg"}
-COMPONENT = re.compile(r"\.([xyz])$")
 STEPS = tuple(0.05 / 4**k for k in range(6))  # increments / size of the number, the first ones preferred
 ACCURATE = 1e-12  # relative error of a derivative of the scene's arrays from which no smaller step is tried
 ROUGH = 1e-6  # relative error above which the arrays are not smooth in the number
@@ -75,13 +73,12 @@ def scene_number(scene: Scene, label: str, base: Model) -> SceneNumber:
     ``base`` is the model of the assembled scene. Raises SceneError if the path has no number, or if no value
     near it makes a valid scene; InputError if the equations do not depend on it smoothly.
     """
-    path = COMPONENT.sub(lambda found: f"[{'xyz'.index(found[1])}]", label)
     found: list[SceneNumber] = []
     faults: list[SceneError] = []
-    size = _size(_value(scene, path, label), path, base)
+    size = _size(number_at(scene, label), label, base)
     for share, stencil in itertools.product(STEPS, (central(), one_sided(1.0), one_sided(-1.0))):
         try:
-            found.append(_differences(scene, label, path, share * size, stencil, base))
+            found.append(_differences(scene, label, share * size, stencil, base))
         except SceneError as fault:
             faults.append(fault)
         if found and found[-1].error <= ACCURATE:
@@ -96,18 +93,18 @@ def scene_number(scene: Scene, label: str, base: Model) -> SceneNumber:
 
 def unit_of_number(scene: Scene, label: str) -> str:
     """Return the SI unit of a number; empty for ratios, and for coefficients of functions of time."""
-    field = re.findall(r"(?:^|\.)([a-z_]+(?:\(0\))?)", COMPONENT.sub("", label))[-1]
+    field = re.findall(r"(?:^|\.)([a-z_]+(?:\(0\))?)", re.sub(r"\.[xyz]$", "", label))[-1]
     if field not in UNITS_OF_TURNS:
         return UNITS.get(field, "")
     slides = _at(scene, label.rpartition(".")[0]).type in ("spring", "slide_spring", "translational")
     return (UNITS_OF_SLIDES if slides else UNITS_OF_TURNS)[field]
 
 
-def _value(scene: Scene, path: str, label: str) -> float:
+def number_at(scene: Scene, path: str) -> float:
     """Return the number at a path; raises SceneError if there is none."""
     value = _at(scene, path)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise SceneError([f"{label}: the scene has no number at this path"])
+        raise SceneError([f"{path}: the scene has no number at this path"])
     return float(value)
 
 
@@ -119,12 +116,8 @@ def _at(scene: Scene, path: str) -> Any:
         found.append(value)
         return value
 
-    replaced_at(_fields(scene), path, keep)
+    replaced_at({field: getattr(scene, field) for field in Scene.model_fields}, path, keep)
     return found[0]
-
-
-def _fields(scene: Scene) -> dict[str, Any]:
-    return {field: getattr(scene, field) for field in Scene.model_fields}
 
 
 def _size(value: float, path: str, base: Model) -> float:
@@ -134,11 +127,10 @@ def _size(value: float, path: str, base: Model) -> float:
     return abs(value) or 1.0
 
 
-def _differences(
-    scene: Scene, label: str, path: str, step: float, stencil: Stencil, base: Model
-) -> SceneNumber:
+def _differences(scene: Scene, label: str, step: float, stencil: Stencil, base: Model) -> SceneNumber:
     """Return the number with variants at a step times the offsets of a stencil."""
-    scenes = tuple(_changed(scene, path, step * offset) for offset in stencil.offsets)
+    value = number_at(scene, label)
+    scenes = tuple(scene.with_(label, value + step * offset) for offset in stencil.offsets)
     if any(shape_of(each) != shape_of(scene) for each in scenes):
         raise InputError(f"{label}: the equations change their form with this number")
     models = tuple(Model(assembled(each)) for each in scenes)
@@ -175,11 +167,3 @@ def _arrays(model: Model) -> Iterator[np.ndarray]:
         *data.functions[1:],
     )
     yield from data.loads[FIRST_OF_LOADS:]
-
-
-def _changed(scene: Scene, path: str, by: float) -> Scene:
-    return Scene(**replaced_at(_fields(scene), path, partial(_plus, by)))
-
-
-def _plus(by: float, value: float) -> float:
-    return value + by

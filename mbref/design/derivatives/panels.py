@@ -43,12 +43,9 @@ def gauss(count: int) -> Gauss:
 
 def _integrals(ends: np.ndarray, analysis: np.ndarray) -> np.ndarray:
     """Return the integrals (e, N) of the Lagrange polynomials from 0 to ends (e,)."""
-    count = len(analysis)
-    of_legendre = np.empty((len(ends), count))
-    for k in range(count):
-        series = legendre.legint(np.eye(count)[k], lbnd=-1)
-        of_legendre[:, k] = 0.5 * legendre.legval(2.0 * ends - 1.0, series)
-    return of_legendre @ analysis
+    values = legendre.legvander(2.0 * ends - 1.0, len(analysis))  # ∫ P_k = (P_{k+1} - P_{k-1})/(2 k + 1)
+    before = np.concatenate([-np.ones((len(ends), 1)), values[:, :-2]], axis=1)
+    return 0.5 * (values[:, 1:] - before) / (2 * np.arange(len(analysis)) + 1) @ analysis
 
 
 class CollocationPanel(NamedTuple):

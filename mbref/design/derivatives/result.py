@@ -29,7 +29,8 @@ class Sensitivities:
     outputs, parameters : tuple of str
         Names of the o outputs and p numbers.
     units : tuple of tuple of str
-        Units (o, p) of the derivatives, such as ``"(J)/(kg)"``.
+        Units (o, p) of the derivatives, such as ``"(J)/(kg)"``; ``SI`` stands for units of ratios and of
+        coefficients of functions.
     values : ndarray, shape (k, o, p)
         Derivatives, in the SI unit of the output over the SI unit of the number. NaN where a derivative does
         not exist or was not reached.
@@ -96,7 +97,7 @@ class Sensitivities:
             "outputs": list(self.outputs),
             "parameters": list(self.parameters),
             "units": [list(row) for row in self.units],
-            **{name: _with_none(array) for name, array in arrays.items()},
+            **{name: with_none(array) for name, array in arrays.items()},
             "outcome": self.outcome.label,
             "message": self.message,
         }
@@ -138,9 +139,9 @@ class Sensitivities:
             raise InputError(f"{path}: must end in .npz, .json or .csv")
 
 
-def _with_none(array: np.ndarray) -> list[Any]:
-    """Return an array as nested lists, with None for NaN."""
+def with_none(array: np.ndarray) -> list[Any]:
+    """Return an array as nested lists, with None for NaN and infinity."""
     found = array.astype(object)
-    found[np.isnan(array)] = None
+    found[~np.isfinite(array)] = None
     listed: list[Any] = found.tolist()
     return listed

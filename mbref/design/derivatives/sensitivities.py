@@ -20,6 +20,7 @@ from mbref.equations.model import Model
 from mbref.equations.offsets import assembled
 from mbref.input_error import InputError
 from mbref.method import SERIES_METHOD, Method, default_method
+from mbref.motions.motion import Motion
 from mbref.motions.outputs import UNIT_OF, quantity_of
 from mbref.motions.pieces import is_intermittent
 from mbref.motions.trajectory import Outcome
@@ -80,26 +81,25 @@ def sensitivities(
         If an output has no derivative, if the motion does not depend smoothly on a number, if a number moves
         the time of a switch or opens a loop, or if constraints have intervals.
     """
-    scene = find_scene(scene)
-    samples = checked_times(np.linspace(0.0, scene.duration, SAMPLES) if times is None else times)
-    if samples[-1] > scene.duration:
-        scene = scene.with_(duration=float(samples[-1]))
-    _refuse(scene, of, to)
+    request = _Request(find_scene(scene), of, to, times)
     limits = limits or Limits(rtol=RTOL)
-    model = Model(assembled(scene))
-    if model.m > MOST_ROWS:
-        raise InputError(f"{scene.name}: {model.m} constraint rows; derivatives are for up to {MOST_ROWS}")
-    method = Method.parse(default_method(scene))
-    numbers = _Numbers(scene, model, to)
-    run = Followed.of(scene, model, method, limits, samples, gauss(FIRST_PRECISION.points))
-    first = numbers.derivatives(of, run, FIRST_PRECISION.step)
+    first = request.solved(request.method, limits, FIRST_PRECISION)
     finer = replace(limits, rtol=max(FINEST, FINER * limits.rtol), atol=None)
-    by = Method.parse(f"{SERIES_METHOD}[order={ORDER}]") if method.is_series else method
-    run = Followed.of(scene, model, by, finer, samples, gauss(SECOND_PRECISION.points))
-    second = numbers.derivatives(of, run, SECOND_PRECISION.step)
-    for each in (model, *(variant for number in numbers.of_scene for variant in number.models)):
-        each.release()
-    return _compared(first, second, numbers, samples)
+    by = Method.parse(f"{SERIES_METHOD}[order={ORDER}]") if request.method.is_series else request.method
+    second = request.solved(by, finer, SECOND_PRECISION)
+    request.release()
+    return _compared(first, second, request)
+
+
+def motion_and_derivatives(
+    scene: Scene, of: Sequence[str], to: Sequence[str], times: np.ndarray, limits: Limits
+) -> tuple[Motion, list[str], np.ndarray]:
+    """Return the motion at times (k,), s, the outputs' names, and their derivatives (k, outputs, numbers) up
+    to a singular position, without an estimate of their errors. Raises the errors of ``sensitivities``."""
+    request = _Request(scene, of, to, times)
+    found = request.solved(request.method, limits, FIRST_PRECISION)
+    request.release()
+    return found.run.motion, found.outputs, found.values
 
 
 def _refuse(scene: Scene, of: Sequence[str], to: Sequence[str]) -> None:
@@ -121,21 +121,43 @@ class _Solved(NamedTuple):
     rounding: np.ndarray
 
 
-class _Numbers:
-    """The numbers of a scene and of its start by which its motion is differentiated, by label."""
+class _Request:
+    """A scene's motion at samples (k,), s, its outputs, and the numbers by which it is differentiated."""
 
-    def __init__(self, scene: Scene, model: Model, labels: Sequence[str]):
-        self.model, self.labels = model, tuple(labels)
-        self.of_scene = [scene_number(scene, label, model) for label in labels if not is_of_start(label)]
+    def __init__(
+        self,
+        scene: Scene,
+        of: Sequence[str],
+        labels: Sequence[str],
+        times: Sequence[float] | np.ndarray | None,
+    ):
+        self.samples = checked_times(np.linspace(0.0, scene.duration, SAMPLES) if times is None else times)
+        if self.samples[-1] > scene.duration:
+            scene = scene.with_(duration=float(self.samples[-1]))
+        _refuse(scene, of, labels)
+        self.scene, self.of, self.labels = scene, of, tuple(labels)
+        self.model = Model(assembled(scene))
+        if self.model.m > MOST_ROWS:
+            count = f"{scene.name}: {self.model.m} constraint rows"
+            raise InputError(f"{count}; derivatives are for up to {MOST_ROWS}")
+        self.method = Method.parse(default_method(scene))
+        fields = [label for label in labels if not is_of_start(label)]
+        self.of_scene = [scene_number(scene, label, self.model) for label in fields]
         self.units = [unit_of_number(scene, label) for label in labels]
 
-    def derivatives(self, of: Sequence[str], run: Followed, step: float) -> _Solved:
-        """Return the derivatives of outputs along a run."""
-        model, motion = self.model, run.motion
-        names = differentiable(motion, of)
-        of_start = [
-            start_number(label, motion, model, run.first, step) for label in self.labels if is_of_start(label)
-        ]
+    def release(self) -> None:
+        """Release the memory of the models."""
+        for each in (self.model, *(variant for number in self.of_scene for variant in number.models)):
+            each.release()
+
+    def solved(self, method: Method, limits: Limits, precision: Precision) -> _Solved:
+        """Return the derivatives of the outputs along a run by a method."""
+        model, step = self.model, precision.step
+        run = Followed.of(self.scene, model, method, limits, self.samples, gauss(precision.points))
+        motion = run.motion
+        names = differentiable(motion, self.of)
+        started = [label for label in self.labels if is_of_start(label)]
+        of_start = [start_number(label, motion, model, run.first, step) for label in started]
         every: list[SceneNumber | StartNumber] = [*self.of_scene, *of_start]
         starts = [(number.x, number.v) for number in every]
         found = VariationalEquations(model, run, self.of_scene, step).changes(starts)
@@ -156,23 +178,23 @@ class _Numbers:
         return np.asarray(share * np.abs(values).max(axis=0, initial=0.0, keepdims=True))
 
 
-def _compared(first: _Solved, second: _Solved, numbers: _Numbers, samples: np.ndarray) -> Sensitivities:
+def _compared(first: _Solved, second: _Solved, request: _Request) -> Sensitivities:
     """Return the more accurate derivatives, with the difference of both as their error."""
-    count = min(len(first.values), len(second.values))
+    count, samples = min(len(first.values), len(second.values)), request.samples
     values = np.full((samples.size, *second.values.shape[1:]), np.nan)
     errors = values.copy()
     values[:count] = second.values[:count]
     difference = np.abs(first.values[:count] - values[:count])
-    errors[:count] = difference + second.rounding[:count] + numbers.errors(values[:count])
+    errors[:count] = difference + second.rounding[:count] + request.errors(values[:count])
     motion, t = second.run.motion, min(first.run.undecided_from, second.run.undecided_from)
     outcome, message = motion.outcome, motion.message
     if count < motion.times.size:
         outcome = Outcome.UNDECIDED
         message = f"derivatives end at the singular position at t = {t:.6g} s, where the motion may branch"
     units = tuple(
-        tuple(f"({UNIT_OF[quantity_of(output)] or 1})/({unit or 1})" for unit in numbers.units)
+        tuple(f"({UNIT_OF[quantity_of(output)] or 1})/({unit or 'SI'})" for unit in request.units)
         for output in second.outputs
     )
     return Sensitivities(
-        samples, tuple(second.outputs), numbers.labels, units, values, errors, outcome, message, motion
+        samples, tuple(second.outputs), request.labels, units, values, errors, outcome, message, motion
     )

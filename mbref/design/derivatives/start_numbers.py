@@ -52,6 +52,8 @@ def start_number(label: str, motion: Motion, model: Model, state: States, step: 
     rows = TangentRows(model, state)
     state = with_accelerations(model, state, rows)
     free = rows.free[0]
+    if not free.shape[1]:
+        raise InputError(f"{label}: drivers prescribe the whole motion, also at the start")
     chosen = independent_displacements(free)[None]
     each = tangents_at(model, state, rows, chosen, [], step)
     f, units = chosen.shape[1], model.units

@@ -34,7 +34,7 @@ class States(NamedTuple):
     a: np.ndarray
     multipliers: np.ndarray
 
-    def at(self, places: np.ndarray | slice) -> States:
+    def at(self, places: np.ndarray | list[int] | slice) -> States:
         """Return the states at some times."""
         return States(*(each[places] for each in self))
 

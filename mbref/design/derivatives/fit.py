@@ -1,0 +1,230 @@
+"""fit: numbers of a scene from measured columns of its motion, by least squares with exact derivatives."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mbref.design.derivatives.numbers_of_scene import number_at
+from mbref.design.derivatives.result import with_none
+from mbref.design.derivatives.sensitivities import motion_and_derivatives
+from mbref.design.derivatives.start_numbers import is_of_start
+from mbref.input_error import InputError
+from mbref.motions.outputs import chosen
+from mbref.scene import Scene
+from mbref.scenes import find_scene
+from mbref.simulation.simulate import checked_times
+from mbref.stepping.limits import Limits
+
+FIT_RTOL = 1e-10  # relative tolerance of the runs; derivatives then have about eight digits
+# singular value of the scaled Jacobian / largest one, below which the columns do not determine a combination
+INDETERMINATE = 1e-6
+TAKES_PART = 1e-3  # weight of a number in such a unit combination from which it takes part
+FIT_TOLERANCE = 1e-12  # relative changes of the sum of squares and of the numbers that end the iteration
+NOT_NEGATIVE = ("mass", "inertia", "stiffness", "damping", "natural_length", "armature")
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Numbers of a scene that fit measured columns, at k times with c columns.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene with the fitted numbers.
+    numbers : dict of str to float
+        Fitted values by path, SI units.
+    errors : dict of str to float
+        Standard errors by path, from the scatter of the residuals; infinite for a number that the columns do
+        not determine.
+    correlations : ndarray, shape (p, p)
+        Correlations of the p numbers, in their order; NaN for undetermined ones.
+    undetermined : tuple of dict of str to float
+        Combinations of relative changes of numbers, by path, that change no column.
+    deviations : dict of str to float
+        Root mean square residual of each column, in its unit.
+    converged : bool
+        Whether the iteration ended at a minimum.
+    """
+
+    scene: Scene
+    numbers: dict[str, float]
+    errors: dict[str, float]
+    correlations: np.ndarray
+    undetermined: tuple[dict[str, float], ...]
+    deviations: dict[str, float]
+    converged: bool
+
+    def to_record(self) -> dict[str, Any]:
+        """Return the attributes by name as numbers, lists and text, for JSON, with the scene's tables.
+
+        Returns
+        -------
+        dict
+            Errors that are infinite and correlations that are NaN are None.
+        """
+        return {
+            **vars(self),
+            "scene": self.scene.to_dict(),
+            "errors": {name: error if np.isfinite(error) else None for name, error in self.errors.items()},
+            "correlations": with_none(self.correlations),
+            "undetermined": list(self.undetermined),
+        }
+
+
+def fit(
+    scene: Scene | str | Path,
+    measured: Mapping[str, np.ndarray] | str | Path,
+    free: Sequence[str],
+    of: Sequence[str] | None = None,
+    limits: Limits | None = None,
+) -> Fit:
+    """Return the scene whose motion is nearest to measured columns, by least squares over some numbers.
+
+    Each column counts relative to its standard deviation over the samples. Derivatives are by
+    ``sensitivities``, iterations are by ``scipy.optimize.least_squares``, from the scene's own numbers.
+
+    Parameters
+    ----------
+    scene : Scene, str or path
+        A Scene, the name of a built-in one, or a .toml file.
+    measured : mapping of str to ndarray, shape (k,), or path
+        ``time`` (s) and columns of ``Motion.columns``, SI units; or a .csv file with a line of their names.
+    free : sequence of str
+        Numbers to fit: paths of the scene such as ``"body[rod].mass"``.
+    of : sequence of str, optional
+        Columns to use, or their beginnings. Default: all.
+    limits : Limits, optional
+        Tolerances of the runs. Default: a relative tolerance of 1e-10.
+
+    Returns
+    -------
+    Fit
+        Fitted numbers, standard errors, correlations, and combinations that the columns do not determine.
+
+    Raises
+    ------
+    SceneError
+        If the scene has no number at a path, or the iteration meets a scene that is not valid.
+    InputError
+        If the table has no time or an unknown column, or fewer samples than numbers; if a number is of the
+        start; if a motion that is tried ends early; and for the reasons of ``sensitivities``.
+    """
+    from scipy.optimize import least_squares
+
+    scene, columns = find_scene(scene), _columns(measured)
+    if of is not None:
+        columns = {name: columns[name] for name in ("time", *chosen(columns, of))}
+    problem = _Problem(scene, columns, free, limits or Limits(rtol=FIT_RTOL))
+    begin = problem.start / problem.sizes
+    lower = np.where([_is_not_negative(label) for label in free], 0.0, -np.inf)
+    tolerances = {name: FIT_TOLERANCE for name in ("ftol", "xtol", "gtol")}
+    found = least_squares(problem.residuals, begin, problem.jacobian, bounds=(lower, np.inf), **tolerances)
+    return problem.solution(found.x, found.status > 0)
+
+
+def _columns(measured: Mapping[str, np.ndarray] | str | Path) -> dict[str, np.ndarray]:
+    """Return measured columns (k,); raises InputError for a table that is not of numbers."""
+    if not isinstance(measured, Mapping):
+        with open(measured, encoding="utf-8-sig", newline="") as file:
+            names, *rows = [*csv.reader(file)] or [[]]
+        try:
+            table = np.array(rows, dtype=float).reshape(len(rows), len(names))
+        except ValueError:
+            raise InputError(f"{measured}: must have a line of names, and lines of as many numbers") from None
+        measured = dict(zip(names, table.T, strict=True))
+    found = {name: np.asarray(values, dtype=float) for name, values in measured.items()}
+    if "time" not in found or len(found) < 2 or len({values.shape for values in found.values()}) > 1:
+        raise InputError("measured: needs time and one column at least, of equal lengths")
+    if not all(np.isfinite(values).all() for values in found.values()):
+        raise InputError("measured: a number is not finite")
+    return found
+
+
+def _is_not_negative(label: str) -> bool:
+    return any(part.partition("[")[0] in NOT_NEGATIVE for part in label.split("."))
+
+
+class _Problem:
+    """Residuals and Jacobian of measured columns as functions of numbers over their sizes."""
+
+    def __init__(self, scene: Scene, columns: Mapping[str, np.ndarray], free: Sequence[str], limits: Limits):
+        for label in free:
+            if is_of_start(label):
+                raise InputError(
+                    f"{label}: numbers of the start are no fields of the scene, and cannot be fitted"
+                )
+        self.scene, self.free, self.limits = scene, tuple(free), limits
+        self.times = checked_times(columns["time"])
+        self.measured = {name: values for name, values in columns.items() if name != "time"}
+        self.start = np.array([number_at(scene, label) for label in free])
+        self.sizes = np.where(self.start == 0.0, 1.0, np.abs(self.start))
+        if self.times.size * len(self.measured) <= len(free):
+            raise InputError("measured: has no more numbers than are to be fitted")
+        spread = [values.std() for values in self.measured.values()]
+        self.scales = np.array([deviation or 1.0 for deviation in spread])
+        self._last: tuple[bytes, np.ndarray, np.ndarray] | None = None
+
+    def scene_at(self, z: np.ndarray) -> Scene:
+        """Return the scene with numbers z (p,), over their sizes."""
+        scene = self.scene
+        for label, value in zip(self.free, (z * self.sizes).tolist(), strict=True):
+            scene = scene.with_(label, value)
+        return scene
+
+    def _at(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the differences (k, c) of the motion's columns from the measured ones, and their derivatives
+        (k, c, p)."""
+        if self._last is None or self._last[0] != z.tobytes():
+            request = self.scene_at(z), list(self.measured), self.free, self.times, self.limits
+            motion, outputs, derivatives = motion_and_derivatives(*request)
+            if outputs != [*self.measured]:
+                raise InputError(f"measured: name whole columns: {', '.join(outputs)}")
+            if len(derivatives) < self.times.size:
+                numbers = zip(self.free, z * self.sizes, strict=True)
+                values = ", ".join(f"{name} = {x:.6g}" for name, x in numbers)
+                reason = motion.message or "it passes a singular position"
+                raise InputError(f"fit: the motion with {values} has no derivatives to the end: {reason}")
+            table = motion.columns(*outputs)
+            off = np.array([table[name] - values for name, values in self.measured.items()]).T
+            self._last = z.tobytes(), off, derivatives
+        return self._last[1:]
+
+    def residuals(self, z: np.ndarray) -> np.ndarray:
+        """Return the scaled residuals (k c,)."""
+        return (self._at(z)[0] / self.scales).ravel()
+
+    def jacobian(self, z: np.ndarray) -> np.ndarray:
+        """Return the derivatives (k c, p) of the residuals."""
+        scaled = self._at(z)[1] / self.scales[:, None] * self.sizes
+        return np.asarray(scaled.reshape(-1, len(self.free)))
+
+    def solution(self, z: np.ndarray, converged: bool) -> Fit:
+        """Return the fit with numbers z (p,), over their sizes."""
+        residuals, off = self.residuals(z), self._at(z)[0]
+        _, values, right = np.linalg.svd(self.jacobian(z), full_matrices=False)
+        known = values > INDETERMINATE * values.max(initial=0.0)
+        variance = residuals @ residuals / (residuals.size - known.sum())
+        covariance = variance * (right[known].T / values[known] ** 2) @ right[known]
+        lost = (np.abs(right[~known]) > TAKES_PART).any(axis=0)
+        deviation = np.where(lost, np.nan, np.sqrt(np.diag(covariance)))
+        with np.errstate(invalid="ignore"):
+            correlations = covariance / np.outer(deviation, deviation)
+        errors = np.where(lost, np.inf, deviation * self.sizes)
+        return Fit(
+            scene=self.scene_at(z),
+            numbers=dict(zip(self.free, (z * self.sizes).tolist(), strict=True)),
+            errors=dict(zip(self.free, errors.tolist(), strict=True)),
+            correlations=correlations,
+            undetermined=tuple(
+                {name: x for name, x in zip(self.free, row.tolist(), strict=True) if abs(x) > TAKES_PART}
+                for row in right[~known]
+            ),
+            deviations=dict(zip(self.measured, np.sqrt((off**2).mean(axis=0)).tolist(), strict=True)),
+            converged=converged,
+        )

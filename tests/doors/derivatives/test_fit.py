@@ -1,0 +1,39 @@
+"""Numbers of scenes from measured columns: planted values are found again, to their standard errors."""
+
+import numpy as np
+import pytest
+
+import mbref
+from mbref.cli import main
+from tests.doors.derivatives.test_sensitivities import pendulum
+from tests.helpers.short_motions import MOTIONS
+
+NOISE = 1e-3  # rad, standard deviation of the errors of a measured angle
+MOST_DEVIATIONS = 4.0  # standard errors; a normal error is larger once in 16 000
+
+
+@pytest.mark.slow
+def test_planted_spring_is_found_from_a_noisy_angle_to_its_standard_errors():
+    scene, times = MOTIONS["pendulum with torsion spring"](), np.linspace(0.02, 0.5, 60)
+    column = mbref.simulate(scene, times=times).columns("A.angle")
+    column["A.angle"] += np.random.default_rng(3).normal(scale=NOISE, size=times.size)
+    true = {"load[0].stiffness": 5.0, "load[0].natural_angle": 1.5, "body[b].mass": 0.7}
+    rough = scene
+    for number, value in true.items():
+        rough = rough.with_(number, 1.2 * value)
+    found = mbref.fit(rough, column, list(true))
+    assert found.converged
+    assert found.deviations["A.angle"] == pytest.approx(NOISE, rel=0.3)  # 60 samples: 9 % by chance
+    for number, value in true.items():
+        assert abs(found.numbers[number] - value) <= MOST_DEVIATIONS * found.errors[number]
+
+
+def test_command_names_the_combination_that_an_angle_does_not_determine(tmp_path, capsys):
+    """A pendulum's angle depends on the ratio of inertia and mass: equal relative changes do not count."""
+    pendulum().save(tmp_path / "scene.toml")
+    mbref.simulate(pendulum(), times=[0.2, 0.4, 0.6]).to_csv(tmp_path / "run.csv")
+    free = ["--of", "A.angle", "--free", "body[bob].mass", "--free", "body[bob].inertia[2]"]
+    assert main(["fit", *map(str, (tmp_path / "scene.toml", tmp_path / "run.csv")), *free]) == 0
+    printed = capsys.readouterr().out.replace("-0.707", "+0.707")
+    assert "+0.707 (body[bob].mass) +0.707 (body[bob].inertia[2])" in printed
+    assert printed.count("standard error inf") == 2
