@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mbref import Motion, Scene, simulate
-from tests.helpers.parts import Z, hinge
+from tests.helpers.parts import Z, hinge, slide
 
 TIMES = np.linspace(0.0, 1.0, 7)
 RATE = 2.0 + 3.0 * TIMES
@@ -48,6 +48,22 @@ def test_springs_store_half_their_stiffness_times_the_square_of_their_stretch():
     assert np.allclose(motion.load_at(0).energy, stored[0], rtol=CLOSE)
     assert np.allclose(motion.load_at(1).energy, stored[1], rtol=CLOSE)
     assert np.allclose(motion.potential_energy, sum(stored), rtol=CLOSE)
+
+
+def test_spring_of_a_slide_stores_half_its_stiffness_times_the_square_of_its_stretch():
+    """A driver moves the block to x = 2 t + 1.5 t² m; the spring is relaxed at -0.5 m."""
+    block = {"name": "block", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.8, 0.0, 0.0]}
+    spring = {"type": "slide_spring", "joint": "S", "stiffness": 8.0, "damping": 0.3}
+    scene = Scene(
+        name="slide",
+        body=[block],
+        joint=[slide("S", "ground", "block", (0.0, 0.0, 0.0))],
+        driver=[{"joint": "S", "polynomial": [0.0, 2.0, 1.5]}],
+        load=[{**spring, "natural_displacement": -0.5}],
+    )
+    motion = simulate(scene, times=TIMES)
+    assert np.allclose(motion.load_at(0).energy, 4.0 * (ANGLE + 0.5) ** 2, rtol=CLOSE)
+    assert np.allclose(motion.potential_energy, motion.load_at(0).energy, rtol=CLOSE)
 
 
 def test_torque_of_a_joint_has_the_power_torque_times_rate_and_stores_no_energy():
