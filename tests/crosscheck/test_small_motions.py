@@ -220,14 +220,15 @@ def test_horizontal_force_fixed_in_space_allows_no_steady_rotation():
 
 
 def test_stored_records_have_every_mechanism_and_errors_of_rounding():
-    """The judge is off the closed forms by at most 1e-13, mbref by 1e-11."""
+    """The judge is off the closed forms by at most 1e-13, mbref by 1e-11; mbref's search misses three
+    poses."""
     stored = records.read()
     assert {record["scene"] for record in stored} == set(KNOWN)
-    for record in stored:
-        assert record["error"] < 1e-13
-        assert (
-            record["mbref_distance"] is None or max(record["mbref_error"], record["mbref_distance"]) < 1e-11
-        )
+    assert all(record["error"] < 1e-13 for record in stored)
+    missed = [record["scene"] for record in stored if record["mbref_distance"] is None]
+    assert missed == ["four_bar_gravity", "four_bar_gravity", "governor"]
+    found = [record for record in stored if record["mbref_distance"] is not None]
+    assert all(max(record["mbref_error"], record["mbref_distance"]) < 1e-11 for record in found)
 
 
 def test_modes_command_compares_a_scene_with_an_engine(tmp_path, capsys):
