@@ -75,8 +75,12 @@ class Supports:
         Bodies of mass 0 and inertia 0.
     sums : bool
         Couplings of more than two coordinates.
+    powers : int
+        Highest power of the first coordinate in a coupling.
     intervals : bool
         Joints and couplings that hold in intervals of time.
+    stops : bool
+        End stops of joint coordinates.
     """
 
     joints: Collection[str] = ()
@@ -87,7 +91,9 @@ class Supports:
     over_time: Collection[str] = ()
     massless_links: bool = False
     sums: bool = False
+    powers: int = 1
     intervals: bool = False
+    stops: bool = False
 
     def missing(self, scene: Scene) -> Cannot | None:
         """Return the refusal of the first joint, coupling, driver or load that is not declared.
@@ -109,7 +115,9 @@ class Supports:
         links = [] if self.massless_links else [body.name for body in scene.body if body.mass == 0]
         yield from (f"body {name!r} is a massless link" for name in links)
         if not self.intervals:
-            yield from (f"{path} has intervals" for path in intermittent(scene))
+            yield from (f"{path} has intervals" for path in intermittent(scene) if path.endswith(".active"))
+        if not self.stops:
+            yield from (f"joint {joint.name!r} has an end stop" for joint in scene.joint if joint.end_stop)
         for joint in scene.joint:
             if joint.type not in self.joints:
                 yield f"joint {joint.name!r} is of type {joint.type!r}"
@@ -134,6 +142,8 @@ class Supports:
                 yield f"coupling {coupling.name!r} has an offset (mbref.assembled(scene) has none)"
             if len(coupling.joints) > MOST_COUPLED and not self.sums:
                 yield f"coupling {coupling.name!r} sums {len(coupling.joints)} coordinates"
+            if coupling.powers > self.powers:
+                yield f"coupling {coupling.name!r} is a polynomial of degree {coupling.powers}"
             for joint, kind in scene.coupled(coupling):
                 if kind not in self.couplings:
                     yield f"coupling {coupling.name!r} couples the {kind} of joint {joint.name!r}"

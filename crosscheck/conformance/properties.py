@@ -21,18 +21,12 @@ from crosscheck.engine import Cannot
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.energy import energy_series
 from crosscheck.judge.gauss_principle import stacked
-from crosscheck.judge.metrics import in_scene_order, violation_series
+from crosscheck.judge.metrics import in_scene_order
 from crosscheck.judge.momentum import momentum_series
 from crosscheck.judge.precision import motion_rate
 from crosscheck.judge.reaction_balance import balance, idle
-from crosscheck.judge.tolerances import (
-    GRAINS,
-    LIKE_TRUTH,
-    REACTIONS,
-    SAME_MOTION,
-    STAYS_CLOSED,
-    UNIT_NORM,
-)
+from crosscheck.judge.tolerances import GRAINS, LIKE_TRUTH, REACTIONS, SAME_MOTION, STAYS_CLOSED, UNIT_NORM
+from crosscheck.judge.violations import violation_series
 from crosscheck.refusals import shortened
 from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory

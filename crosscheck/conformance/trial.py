@@ -17,7 +17,7 @@ from crosscheck.conformance.runners import Runner
 from crosscheck.engine import Cannot, Setting
 from crosscheck.judge.gauss_motion import NAME as GAUSS
 from crosscheck.judge.gauss_motion import gauss_motion
-from crosscheck.judge.metrics import error_series, in_scene_order, violation_series
+from crosscheck.judge.metrics import error_series, in_scene_order
 from crosscheck.judge.precision import motion_rate, not_finite
 from crosscheck.judge.push_difference import pushes_apart
 from crosscheck.judge.tolerances import (
@@ -30,6 +30,7 @@ from crosscheck.judge.tolerances import (
     TRUTH_DRIVEN,
 )
 from crosscheck.judge.truth import NoSolution, closed_form, truth_for
+from crosscheck.judge.violations import violation_series
 from crosscheck.processes.pool import Observation
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene

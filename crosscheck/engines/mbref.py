@@ -14,6 +14,7 @@ from crosscheck.refusals import FACTOR, TABLE
 from crosscheck.setting import BRANCHES, FamilyParts
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import JOINT_TYPES, LOAD_TYPES, Scene, intermittent
+from mbref.scene.couplings import MOST_POWERS
 from mbref.scene.joints import Coordinate
 
 if TYPE_CHECKING:
@@ -81,6 +82,8 @@ class Mbref(Engine):
         over_time=(TABLE, FACTOR),
         massless_links=True,
         sums=True,
+        powers=MOST_POWERS,
+        stops=True,
         intervals=True,
     )
 

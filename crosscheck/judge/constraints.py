@@ -8,13 +8,13 @@ the samples of a trajectory.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from crosscheck.judge import joint_residuals
+from crosscheck.judge.coupling_laws import Law, coupled_rows, law_value, slope_at
 from crosscheck.judge.joint_coordinates import (
-    COORDINATES,
     coordinate_accelerations,
     coordinate_rates,
     coordinates,
@@ -65,7 +65,11 @@ def closure_rates(
         joint.name: joint_residuals.velocity_rows(joint, np.asarray(t, float), *motion)
         for joint in joint_residuals.joint_frames(scene)
     }
-    return found | _coupled(scene, lambda joint: coordinate_rates(joint, *motion))
+
+    def rate(joint: JointFrames, law: Law, column: int) -> np.ndarray:
+        return slope_at(joint, law, column, motion) * coordinate_rates(joint, *motion)[..., column]
+
+    return found | coupled_rows(scene, rate)
 
 
 def closure_accelerations(
@@ -85,7 +89,14 @@ def closure_accelerations(
         joint.name: joint_residuals.acceleration_rows(joint, np.asarray(t, float), *motion)
         for joint in joint_residuals.joint_frames(scene)
     }
-    return found | _coupled(scene, lambda joint: coordinate_accelerations(joint, *motion))
+
+    def second_rate(joint: JointFrames, law: Law, column: int) -> np.ndarray:
+        second = coordinate_accelerations(joint, *motion)[..., column]
+        rate = coordinate_rates(joint, *motion[:4])[..., column]
+        bend = slope_at(joint, law, column, motion, 2) * rate**2
+        return slope_at(joint, law, column, motion) * second + bend
+
+    return found | coupled_rows(scene, second_rate)
 
 
 def coupling_gaps(
@@ -96,29 +107,18 @@ def coupling_gaps(
     angular_velocity: np.ndarray,
     counts: Mapping[str, np.ndarray] | None = None,
 ) -> Residuals:
-    """Return position residuals (k, 1) of couplings by name, Σ factor · q - offset in m or rad, with the
-    arguments of ``joint_coordinates``.
+    """Return position residuals (k, 1) of couplings by name, the sum of their laws minus the offset in m or
+    rad, with the arguments of ``joint_coordinates``.
 
     The residuals are NaN from the first sample on at which the samples are too far apart to count turns.
     """
     motion = (np.asarray(times, float), *with_ground(position, orientation), grounded(angular_velocity))
-    found = _coupled(scene, lambda joint: coordinates(joint, *motion, counts))
+
+    def value(joint: JointFrames, law: Law, column: int) -> np.ndarray:
+        return np.asarray(law_value(law, coordinates(joint, *motion, counts)[:, column]))
+
+    found = coupled_rows(scene, value)
     return {c.name: found[c.name] - c.offset for c in scene.coupling}
-
-
-def _coupled(scene: Scene, of_joint: Callable[[JointFrames], np.ndarray]) -> Residuals:
-    """Return Σ factor · q (…, 1) of each coupling, q₂ - ratio q₁ of two joints, from both coordinates (…, 2)
-    of every joint, or from their rates."""
-    joints = {joint.name: joint for joint in joint_residuals.joint_frames(scene)}
-    found: Residuals = {}
-    for coupling in scene.coupling:
-        ends = zip(scene.coupled(coupling), coupling.factors, strict=True)
-        terms = [
-            factor * of_joint(joints[joint.name])[..., COORDINATES.index(coordinate)]
-            for (joint, coordinate), factor in ends
-        ]
-        found[coupling.name] = sum(terms[1:], terms[0])[..., None]
-    return found
 
 
 def length_rows(scene: Scene) -> dict[str, np.ndarray]:

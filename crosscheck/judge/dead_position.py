@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck.judge.constraints import closure, jacobian, joint_coordinates, length_rows, scene_length
+from crosscheck.judge.coupling_laws import law_value
 from crosscheck.judge.joint_residuals import wrapped
 from mbref import rotations
 from mbref.scene import Scene
@@ -78,8 +79,12 @@ def _residual(scene: Scene, start: Pose, pose: Pose, time: float) -> np.ndarray:
     moved = {n: [wrapped(after[n][0] - before[n][0]), after[n][1] - before[n][1]] for n in after}
     gaps = []
     for coupling in scene.coupling:
-        ends = zip(scene.coupled(coupling), coupling.factors, strict=True)
-        gaps.append(sum(factor * moved[joint.name][kind == DISPLACEMENT] for (joint, kind), factor in ends))
+        gap = 0.0
+        for (joint, kind), law in zip(scene.coupled(coupling), coupling.laws, strict=True):
+            column = int(kind == DISPLACEMENT)
+            first = before[joint.name][column]
+            gap += law_value(law, first + moved[joint.name][column]) - law_value(law, first)
+        gaps.append(gap)
     return np.concatenate([*(of_joints[joint.name] for joint in scene.joint), gaps])
 
 

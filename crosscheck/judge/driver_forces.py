@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck.judge.constraints import jacobian, length_rows
+from crosscheck.judge.coupling_laws import unwound
 from crosscheck.judge.deadline import ask
 from crosscheck.judge.joint_coordinates import reflected
 from crosscheck.judge.joint_reactions import unit_rows
@@ -34,7 +35,8 @@ def driver_forces(scene: Scene, exact: Trajectory) -> dict[str, np.ndarray]:
     ends = dict(zip(rows_of, np.cumsum(list(rows_of.values())), strict=True))
     last = [int(ends[driver.joint]) - 1 for driver in scene.driver]
     wanted = demanded(scene, exact).reshape(len(exact.times), -1)
-    found = np.array([_multipliers(scene, exact, k, push)[last] for k, push in enumerate(wanted)])
+    scenes = unwound(scene, exact)
+    found = np.array([_multipliers(scenes[k], exact, k, push)[last] for k, push in enumerate(wanted)])
     return {driver.joint: found[:, i] for i, driver in enumerate(scene.driver)}
 
 

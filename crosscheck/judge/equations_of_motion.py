@@ -15,6 +15,7 @@ from crosscheck.judge.constraints import (
     joint_coordinates,
     scene_length,
 )
+from crosscheck.judge.coupling_laws import unwound
 from crosscheck.judge.gauss_motion import State, applied
 from crosscheck.judge.gauss_principle import of_least_constraint
 from crosscheck.judge.joint_loads import turning_loads
@@ -67,6 +68,7 @@ def terms_at(scene: Scene, motion: Trajectory, sample: int) -> Terms:
     """Return the terms at a sample of a motion, whose first sample is less than half a turn from t = 0."""
     t, state = float(motion.times[sample]), _state(scene, motion, sample)
     position, orientation, velocity, spin, _ = state
+    scene = unwound(scene, motion)[sample]
     rows, _ = jacobian(scene, t, position, orientation)
     still = np.zeros_like(position)
     driven = _residuals(scene, t, position, orientation, still, still)

@@ -10,14 +10,15 @@ import numpy as np
 
 from crosscheck.judge.constraints import joint_coordinates, scene_length
 from crosscheck.judge.energy import energy_balance
-from crosscheck.judge.impacts import impact
+from crosscheck.judge.impacts import Impact
 from crosscheck.judge.joint_reactions import resultants
 from crosscheck.judge.loads import world_inertia
-from crosscheck.judge.pieces import State, at_start, has_pieces, later
+from crosscheck.judge.pieces import State, at_start, followed, has_pieces, later, permanent
+from crosscheck.judge.stops import bounced, ends_of, held, hits
 from mbref import rotations
 from mbref.motions.event import Event
 from mbref.motions.trajectory import PER_BODY, Trajectory
-from mbref.scene import JointLoad, Scene
+from mbref.scene import Scene
 
 
 def parts(
@@ -44,10 +45,11 @@ def _pieces(scene: Scene, trajectory: Trajectory) -> Iterator[tuple[float, Scene
     if trajectory.events is None:
         return
     piece = at_start(scene)
+    contacts: tuple[str, ...] = ()
     for event in trajectory.events:
-        yield event.time, piece
-        piece = _after(scene, piece, event)
-    yield np.inf, piece
+        yield event.time, held(piece, contacts)
+        piece, contacts = _after(scene, piece, event), event.contacts
+    yield np.inf, held(piece, contacts)
 
 
 def _after(scene: Scene, piece: Scene, event: Event) -> Scene:
@@ -55,7 +57,16 @@ def _after(scene: Scene, piece: Scene, event: Event) -> Scene:
     run's velocities before it: they obey the constraints exactly."""
     before, moved = _before(event), _moved(scene, event)
     after = later(scene, piece, event.time, before, moved)
-    return later(scene, piece, event.time, impact(after, before).state, moved)
+    return later(scene, piece, event.time, _jump(scene, after, event).state, moved)
+
+
+def _jump(scene: Scene, after: Scene, event: Event) -> Impact:
+    """Return the judge's impact at an event, with the end stops that the run met."""
+    before, bare = _before(event), after.with_(driver=after.driver[: len(scene.driver)])
+    touching = [end for end in ends_of(scene) if end.name in (*event.stops, *event.contacts)]
+    wanted = hits(bare, [end for end in touching if end.name in event.stops], before, ())
+    wanted |= {end: 0.0 for end in wanted if end.name in event.chatter}
+    return bounced(bare, before, touching, wanted)
 
 
 def _before(event: Event) -> State:
@@ -64,15 +75,12 @@ def _before(event: Event) -> State:
 
 
 def _moved(scene: Scene, event: Event) -> dict[str, np.ndarray]:
-    """Return angle (rad, as the run counted it, or NaN) and displacement (m) (2,) of joints with loads."""
-    always = scene.with_(joint=[joint for joint in scene.joint if joint.active is None], coupling=(), load=())
+    """Return angle (rad, as the run counted it, or NaN) and displacement (m) (2,) of followed joints."""
+    joints = [permanent(joint) for joint in scene.joint if joint.active is None]
+    always = scene.with_(joint=joints, coupling=(), load=())
     pose = event.position[None], event.orientation[None], 0.0 * event.angular_velocity[None]
     found = joint_coordinates(always, np.zeros(1), *pose)
-    loads = [load for load in scene.load if isinstance(load, JointLoad)]
-    return {
-        load.joint: np.array([event.angles.get(load.joint, np.nan), found[load.joint][0, 1]])
-        for load in loads
-    }
+    return {name: np.array([event.angles.get(name, np.nan), found[name][0, 1]]) for name in followed(scene)}
 
 
 def _between(motion: Trajectory, begin: float, end: float, turned: dict[str, float]) -> Trajectory:
@@ -124,7 +132,7 @@ def impact_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | None)
     velocities times the scene's length, relative to the largest velocity before; None without impacts."""
     off, scale, length = [0.0], [0.0], scene_length(scene)
     for event, after in _impacts(scene, trajectory):
-        found = impact(after, _before(event)).state
+        found = _jump(scene, after, event).state
         off.append(float(np.abs(found.velocity - event.velocity_after).max()))
         off.append(length * float(np.abs(found.angular_velocity - event.angular_velocity_after).max()))
         scale += [float(np.abs(event.velocity).max()), length * float(np.abs(event.angular_velocity).max())]
@@ -136,19 +144,19 @@ def impact_energy_error(scene: Scene, trajectory: Trajectory, exact: Trajectory 
     velocities, relative to the energy before; None with drivers, which do work."""
     off = []
     for event, after in _impacts(scene, trajectory):
-        if not scene.driver and event.energy_before:
+        if not scene.driver and event.energy_before and not event.stops:
             lost = event.energy_before - event.energy_after
-            off.append(abs(lost - impact(after, _before(event)).lost) / event.energy_before)
+            off.append(abs(lost - _jump(scene, after, event).lost) / event.energy_before)
     return max(off, default=None)
 
 
 def _impacts(scene: Scene, trajectory: Trajectory) -> Iterator[tuple[Event, Scene]]:
-    """Yield the events of a run at which constraints begin to hold, with the scene after each."""
+    """Yield the events of a run at which velocities jump, with the scene after each."""
     if not has_pieces(scene) or not trajectory.events:
         return
     scenes = [piece for _, piece in _pieces(scene, trajectory)]
     for event, after in zip(trajectory.events, scenes[1:], strict=True):
-        if event.engaged:
+        if event.jumps:
             yield event, after
 
 

@@ -86,6 +86,13 @@ def coordinates(
     return np.stack([angle, resolve(frames[0], offset)[:, 2]], axis=1)
 
 
+def pose_coordinates(joint: JointFrames, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+    """Return the angle about the axis, within half a turn, and the displacement along it (…, 2) at poses."""
+    _, offset, frames = in_world(joint, position, orientation)
+    turned = twist(rotations.multiply(rotations.conjugate(frames[0]), frames[1]))
+    return np.stack([wrapped(turned), resolve(frames[0], offset)[..., 2]], axis=-1)
+
+
 def counted(times: np.ndarray, angle: np.ndarray, rate: np.ndarray) -> np.ndarray:
     """Return angles (k,) with full turns counted by means of the rates (k,); the given angles are known up to
     full turns and zero at t = 0.

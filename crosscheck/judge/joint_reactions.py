@@ -19,7 +19,9 @@ from crosscheck.judge.constraints import (
     length_rows,
     scene_length,
 )
-from crosscheck.judge.joint_coordinates import COORDINATES, coordinate_jacobian
+from crosscheck.judge.coupling_laws import law_value, unwound
+from crosscheck.judge.joint_coordinates import COORDINATES, coordinate_jacobian, pose_coordinates
+from crosscheck.judge.joint_residuals import joint_frames, with_ground
 from crosscheck.judge.loads import attachment
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
@@ -113,10 +115,27 @@ def of_multipliers(
         start = stop
         first = len(rows) - len(scene.coupling)
         for k, coupling in enumerate(scene.coupling, first):
-            for factor, (other, coordinate) in zip(coupling.factors, scene.coupled(coupling), strict=True):
+            for law, (other, coordinate) in zip(coupling.laws, scene.coupled(coupling), strict=True):
                 if other.name == joint.name:
-                    found[:, k] += factor * along_coordinate(scene, joint, coordinate, position, orientation)
+                    slope = _slope(scene, joint, law, coordinate, position, orientation)
+                    found[:, k] += slope * along_coordinate(scene, joint, coordinate, position, orientation)
         yield joint, found
+
+
+def _slope(
+    scene: Scene,
+    joint: Joint,
+    law: tuple[float, ...],
+    coordinate: Coordinate,
+    position: np.ndarray,
+    orientation: np.ndarray,
+) -> float:
+    """Return the derivative of a coupling's law at a pose, with an angle within half a turn."""
+    if len(law) == 1:
+        return law[0]
+    frames = next(each for each in joint_frames(scene) if each.name == joint.name)
+    found = pose_coordinates(frames, *with_ground(position, orientation))
+    return float(law_value(law, found[COORDINATES.index(coordinate)], 1))
 
 
 def along_coordinate(
@@ -154,6 +173,7 @@ def side_by_side(scene: Scene, runs: Mapping[str, Trajectory], sample: int) -> d
     """Return for each joint with undetermined components the size (N, moments over the scene's length) of
     every run's component in these directions at a sample."""
     pose = next(iter(runs.values()))
+    scene = unwound(scene, pose)[sample]
     shared = shared_wrenches(scene, pose.times[sample], pose.position[sample], pose.orientation[sample])
     units = np.repeat([1.0, scene_length(scene)], 3)
     return {
@@ -199,6 +219,7 @@ def _at_sample(
     assert first.reactions is not None
     assert second.reactions is not None
     units = np.repeat([1.0, scene_length(scene)], 3)
+    scene = unwound(scene, first)[k]
     shared = shared_wrenches(scene, first.times[k], first.position[k], first.orientation[k])
     joints = {}
     for name, basis in shared.items():

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, overload
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from crosscheck.judge.reaction_balance import with_exact_reactions
 from crosscheck.judge.start import started
 from crosscheck.judge.tolerances import LEAST_ORDER, ROUNDING, STRAIGHT_LINE
 from crosscheck.judge.truth import NoSolution, Truth
+from crosscheck.judge.violations import violation_series
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
@@ -139,41 +140,6 @@ def error_series(scene: Scene, trajectory: Trajectory, exact: Trajectory) -> np.
     return np.maximum(
         position_error_series(scene, trajectory, exact), rotation_error_series(scene, trajectory, exact)
     )
-
-
-@overload
-def violation_series(scene: Scene, trajectory: Trajectory, level: Literal[0, 1] = 0) -> np.ndarray:
-    """Return the residuals at position or velocity level, which every trajectory has."""
-
-
-@overload
-def violation_series(scene: Scene, trajectory: Trajectory, level: int) -> np.ndarray | None:
-    """Return the residuals at any level."""
-
-
-def violation_series(scene: Scene, trajectory: Trajectory, level: int = 0) -> np.ndarray | None:
-    """Return the largest joint residual (k,) at position (0), velocity (1) or acceleration (2) level. Lengths
-    are divided by the scene's length, so that the unit is rad, rad/s, rad/s². None if accelerations are
-    missing.
-
-    At position level couplings are included as long as full turns of their joints can be counted."""
-    pose = (trajectory.times, trajectory.position, trajectory.orientation)
-    rates = (trajectory.velocity, trajectory.angular_velocity)
-    if level == 0:
-        residuals = constraints.closure(scene, *pose)
-        gaps = constraints.coupling_gaps(scene, *pose, trajectory.angular_velocity, trajectory.angles)
-        residuals |= {name: np.nan_to_num(gap, nan=0.0) for name, gap in gaps.items()}
-    elif level == 1:
-        residuals = constraints.closure_rates(scene, *pose, *rates)
-    elif trajectory.acceleration is None or trajectory.angular_acceleration is None:
-        return None
-    else:
-        second = (trajectory.acceleration, trajectory.angular_acceleration)
-        residuals = constraints.closure_accelerations(scene, *pose, *rates, *second)
-    length = constraints.scene_length(scene)
-    are_lengths = constraints.length_rows(scene)
-    scaled = [np.abs(r) / np.where(are_lengths[name], length, 1.0) for name, r in residuals.items()]
-    return np.concatenate([np.zeros_like(trajectory.times)[:, None], *scaled], axis=1).max(axis=1)
 
 
 def _against_exact(series: Callable[..., np.ndarray]) -> Callable[..., float | None]:

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.judge.constraints import initial_twists, jacobian, joint_coordinates, scene_length
+from crosscheck.judge.coupling_laws import unwound
 from crosscheck.judge.energy import kinetic_energy, potential_energy
 from crosscheck.judge.gauss_motion import accelerations
 from crosscheck.judge.joint_loads import turning_loads
@@ -172,7 +173,8 @@ def _regular(scene: Scene, run: Trajectory, chosen: Sequence[int]) -> list[int]:
     if not scene.joint:
         return list(chosen)
     units = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))
-    rows = (jacobian(scene, run.times[k], run.position[k], run.orientation[k])[0] * units for k in chosen)
+    scenes = unwound(scene, run)
+    rows = (jacobian(scenes[k], run.times[k], run.position[k], run.orientation[k])[0] * units for k in chosen)
     values = [np.linalg.svd(matrix, compute_uv=False) for matrix in rows]
     ranks = [int(np.sum(v > RANK * v[0])) for v in values]
     near = [bool(v[rank - 1] < NEXT_TO_SINGULAR * v[0]) for v, rank in zip(values, ranks, strict=True)]

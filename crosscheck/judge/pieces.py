@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from crosscheck.judge.constraints import closure, length_rows, scene_length
+from crosscheck.judge.coupling_laws import from_coordinate
 from mbref import rotations
-from mbref.scene import GROUND, Body, Joint, JointLoad, Scene, SceneError
+from mbref.scene import GROUND, Body, Coupling, Joint, JointLoad, Scene, SceneError
 from mbref.scene.joints import ANGLE
 
 MISSED = 1e-6  # gap of a given pose (lengths of the mechanism, or rad) above which a joint cannot engage
@@ -51,8 +52,9 @@ def _fastest(state: State, length: float) -> float:
 
 
 def has_pieces(scene: Scene) -> bool:
-    """Return whether a joint or a coupling of the scene has intervals."""
-    return any(part.active is not None for part in (*scene.joint, *scene.coupling))
+    """Return whether a joint or a coupling of the scene has intervals, or a joint an end stop."""
+    sometimes = any(part.active is not None for part in (*scene.joint, *scene.coupling))
+    return sometimes or any(joint.end_stop is not None for joint in scene.joint)
 
 
 def events(scene: Scene, end: float) -> list[float]:
@@ -67,8 +69,8 @@ def at_start(scene: Scene) -> Scene:
     if not has_pieces(scene):
         return scene
     return scene.with_(
-        joint=[_permanent(part) for part in scene.joint if holds(part, 0.0)],
-        coupling=[_permanent(part) for part in scene.coupling if holds(part, 0.0)],
+        joint=[permanent(part) for part in scene.joint if holds(part, 0.0)],
+        coupling=[permanent(part) for part in scene.coupling if holds(part, 0.0)],
     )
 
 
@@ -77,14 +79,20 @@ def holds(part: Any, t: float) -> bool:
     return part.active is None or any(first <= t < last for first, last in part.active)
 
 
-def _permanent(part: Any) -> Any:
-    return part.model_copy(update=PERMANENT)
+def permanent(part: Any) -> Any:
+    """Return a joint or a coupling without intervals and end stops."""
+    return part.model_copy(update=_always(part))
+
+
+def _always(part: Any) -> dict[str, Any]:
+    """Return the changed fields of a joint or a coupling without intervals and end stops."""
+    return {**PERMANENT, "stop": None} if getattr(part, "end_stop", None) else PERMANENT
 
 
 def later(scene: Scene, before: Scene, t: float, state: State, moved: Mapping[str, np.ndarray]) -> Scene:
     """Return the piece that begins at t (s) in a state, after the piece ``before``.
 
-    ``moved`` has angle (rad, full turns counted) and displacement (m) since t = 0 of the joints with loads.
+    ``moved`` has angle (rad, full turns counted) and displacement (m) since t = 0 of ``followed``.
     Raises SceneError if a joint does not meet a given pose.
     """
     return scene.with_(
@@ -92,11 +100,29 @@ def later(scene: Scene, before: Scene, t: float, state: State, moved: Mapping[st
         body=[_moved(body, b, state) for b, body in enumerate(scene.body)],
         joint=[_placed(scene, before, joint, t, state) for joint in scene.joint if holds(joint, t)],
         coupling=[
-            part.model_copy(update={**PERMANENT, "offset": 0.0}) for part in scene.coupling if holds(part, t)
+            from_coordinate(part, _led(scene, part, moved)).model_copy(update={**PERMANENT, "offset": 0.0})
+            for part in scene.coupling
+            if holds(part, t)
         ],
         driver=[driver.from_time(t) for driver in scene.driver],
         load=[found for load in scene.load for found in _load(scene, load, t, state, moved)],
     )
+
+
+def followed(scene: Scene) -> list[str]:
+    """Return the joints on whose coordinates since t = 0 a later piece depends: those with loads or end
+    stops, and the first ones of polynomial couplings."""
+    loaded = [load.joint for load in scene.load if isinstance(load, JointLoad)]
+    loaded += [joint.name for joint in scene.joint if joint.end_stop]
+    return loaded + [coupling.joints[0] for coupling in scene.coupling if coupling.powers > 1]
+
+
+def _led(scene: Scene, coupling: Coupling, moved: Mapping[str, np.ndarray]) -> float:
+    """Return the first coordinate of a polynomial coupling since t = 0, rad or m; 0 for a linear one."""
+    if coupling.powers == 1:
+        return 0.0
+    joint, kind = scene.coupled(coupling)[0]
+    return float(moved[joint.name][int(kind != ANGLE)])
 
 
 def _moved(body: Body, b: int, state: State) -> Body:
@@ -123,7 +149,7 @@ def _placed(scene: Scene, before: Scene, joint: Joint, t: float, state: State) -
         "axes": tuple(listed),
     }
     fields = {key: place for key, place in places.items() if key in type(joint).model_fields}
-    return joint.model_copy(update={**PERMANENT, **fields})
+    return joint.model_copy(update={**_always(joint), **fields})
 
 
 def _carried(scene: Scene, state: State, name: str, point: Sequence[float]) -> np.ndarray:
@@ -162,7 +188,7 @@ def _load(scene: Scene, load: Any, t: float, state: State, moved: Mapping[str, n
 
 def _refuse_gap(scene: Scene, joint: Joint, t: float, state: State) -> None:
     """Raise SceneError if the poses of a state do not obey a joint as the scene gives it."""
-    alone = scene.with_(joint=[_permanent(joint)], coupling=(), driver=(), load=())
+    alone = scene.with_(joint=[permanent(joint)], coupling=(), driver=(), load=())
     rows = closure(alone, 0.0, state.position, state.orientation)[joint.name]
     lengths = np.where(length_rows(alone)[joint.name], scene_length(alone), 1.0)
     if (gap := float(np.abs(rows / lengths).max(initial=0.0))) > MISSED:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.coupling_laws import unwound
 from crosscheck.judge.joint_reactions import LEAST, shared_wrenches
 from crosscheck.judge.tolerances import RANK
 from mbref.motions.trajectory import Trajectory
@@ -54,6 +55,7 @@ def _reactions(scene: Scene, expected: Trajectory, found: Trajectory, rank: floa
     units = np.repeat([1.0, scene_length(scene)], 3)
     weight = LEAST * sum(body.mass or 0.0 for body in scene.body)
     scale = max([weight, *(float(np.linalg.norm(w[-1] / units)) for w in first.values())])
+    scene = unwound(scene, found)[-1]
     shared = shared_wrenches(scene, found.times[-1], found.position[-1], found.orientation[-1], rank)
     worst = 0.0
     for name in common:

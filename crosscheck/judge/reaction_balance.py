@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from crosscheck.judge.constraints import jacobian, joint_coordinates, scene_length
+from crosscheck.judge.coupling_laws import unwound
 from crosscheck.judge.deadline import ask
 from crosscheck.judge.gauss_motion import applied
 from crosscheck.judge.joint_coordinates import reflected
@@ -37,14 +38,14 @@ def with_exact_reactions(scene: Scene, exact: Trajectory) -> Trajectory:
     """
     found = {joint.name: np.zeros((len(exact.times), 6)) for joint in scene.joint}
     wanted = demanded(scene, exact)
-    for k in range(len(exact.times)):
+    for k, own in enumerate(unwound(scene, exact)):
         position, orientation = exact.position[k], exact.orientation[k]
-        rows, _ = jacobian(scene, exact.times[k], position, orientation)
+        rows, _ = jacobian(own, exact.times[k], position, orientation)
         scaled, units, sizes = unit_rows(scene, rows)
         turned, strengths = _of_armatures(scene, exact, k)
         pushed = units * (wanted[k].ravel() - turned.T @ strengths)
         pushes = np.linalg.lstsq(scaled.T, pushed, rcond=RANK)[0] / sizes
-        for joint, wrenches in of_multipliers(scene, rows, position, orientation):
+        for joint, wrenches in of_multipliers(own, rows, position, orientation):
             found[joint.name][k] = wrenches @ pushes
         geared = [joint for joint in scene.joint if joint.reflected_inertia]
         for joint, row, strength in zip(geared, turned, strengths, strict=True):
@@ -127,7 +128,7 @@ def idle(scene: Scene, run: Trajectory, exact: Trajectory) -> float:
     length = scene_length(scene)
     wanted = demanded(scene, exact) / np.repeat([1.0, length], 3)
     units = np.repeat([1.0, length], 3)
-    worst = float(np.max([_idle_at(scene, run, k, units) for k in range(len(run.times))]))
+    worst = float(np.max([_idle_at(each, run, k, units) for k, each in enumerate(unwound(scene, run))]))
     return worst / _scale(scene, wanted)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from crosscheck.judge.metrics import violation_series
+from crosscheck.judge.violations import violation_series
 from crosscheck.paper.runs import GROWTH, PEAKS, Cases, Label, Records
 from crosscheck.study.grid import Case, Record, key, run_in_turn, study
 from crosscheck.study.progress import Shown

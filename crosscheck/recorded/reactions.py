@@ -6,6 +6,7 @@ from collections.abc import Collection
 
 import numpy as np
 
+from crosscheck.judge.coupling_laws import unwound
 from crosscheck.judge.joint_reactions import shared_wrenches
 from crosscheck.judge.reaction_balance import with_exact_reactions
 from crosscheck.judge.tolerances import RANK
@@ -30,7 +31,7 @@ def reactions(scene: Scene, motion: Trajectory, wanted: Collection[str]) -> dict
         return {}
     found = with_exact_reactions(scene, motion).reactions or {}
     poses = zip(motion.times.tolist(), motion.position, motion.orientation, strict=True)
-    shared = [shared_wrenches(scene, *pose) for pose in poses]
+    shared = [shared_wrenches(own, *pose) for own, pose in zip(unwound(scene, motion), poses, strict=True)]
     columns: dict[str, np.ndarray] = {}
     for joint, wrenches in found.items():
         is_open = [np.linalg.norm(bases[joint], axis=1) > RANK for bases in shared]

@@ -10,7 +10,7 @@ import numpy as np
 from mbref import rotations
 from mbref.design.balance import ONE_POSE, Newton, are_one, balanced, starts_from
 from mbref.design.falling import fallen
-from mbref.design.joint_angles import slots, spring_angles
+from mbref.design.joint_angles import slots
 from mbref.design.linearisation import Tangent, multipliers, unsteady
 from mbref.design.stability import eigenvalues_of, linear_at
 from mbref.design.turning import Turning, turning
@@ -18,6 +18,7 @@ from mbref.design.winding import wound
 from mbref.design.windings import Windings
 from mbref.equations.driver_conflicts import refuse_conflict
 from mbref.equations.initial_state import consistent_start, solve_positions
+from mbref.equations.joint_angles import angles_by_joint
 from mbref.equations.joint_reactions import reactions
 from mbref.equations.model import Model, displaced
 from mbref.equations.offsets import assembled
@@ -259,14 +260,19 @@ def _equilibrium(found: Newton, singular: bool, freedoms: int) -> Equilibrium:
     tangent = found.tangent.along(found.directions)
     model, count = tangent.model, len(tangent.model.scene.body)
     q = tangent.q.reshape(1, model.nb, 7)
-    scene = placed_with_springs(model, tangent.q, spring_angles(model, tangent.angles))
+    angles = tangent.angles[None]
+    turned = {
+        name: float(each[0]) for name, each in angles_by_joint(model.scene, model.structure, angles).items()
+    }
+    scene = placed_with_springs(model, tangent.q, turned)
     placed = tangent.frame.with_armature(scene, tangent.frame.armature)
     placed = placed.with_(body=tangent.frame.bodies(scene))
     if singular or tangent.freedoms != freedoms:
         none = np.zeros(0, dtype=complex)
         return Equilibrium(placed, none, np.zeros((0, count, 6), dtype=complex), {}, tangent.frame.rate)
     eigenvalues = eigenvalues_of(linear_at(tangent, found.directions.T @ found.away()))
-    forces = reactions(model, q, model.terms(np.zeros(1), q).blocks, multipliers(tangent)[None])
+    blocks = model.terms(np.zeros(1), q, angles=angles).blocks
+    forces = reactions(model, q, blocks, multipliers(tangent)[None], angles)
     return Equilibrium(
         placed,
         eigenvalues.values,

@@ -16,9 +16,3 @@ def sprung(model: Model) -> np.ndarray:
     """Return the loads (k,) that are torsion springs, by their place among the loads of the equations."""
     loads = model.data.loads
     return np.flatnonzero((loads.angle >= 0) & (loads.stiffness > 0.0))
-
-
-def spring_angles(model: Model, angles: np.ndarray) -> dict[int, float]:
-    """Return the angle (rad) of each load about an axis, by its number in the scene."""
-    of = model.data.loads.angle
-    return {k: float(angles[of[k]]) for k in range(len(of)) if of[k] >= 0}

@@ -81,7 +81,9 @@ class BatchResult(NamedTuple):
                     mechanism=scenes[place],
                     times=self.times,
                     **poses,
-                    **lazy_reactions(scenes[place], self.times, self.coordinates[k], self.multipliers[k]),
+                    **lazy_reactions(
+                        scenes[place], self.times, self.coordinates[k], self.multipliers[k], self.angles[k]
+                    ),
                     angles=counted_angles(scenes[place], self.structure, self.angles[k]),
                     outcome=OUTCOMES[DONE],
                     t_end=float(self.times[-1]),

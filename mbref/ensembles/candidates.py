@@ -107,9 +107,11 @@ class Evaluations:
         m, n, memory, shape = self._model.m, self._model.n, self._model.memory, times.shape
         columns = self._model.entry_columns
         blocks, rows, forces = (np.empty((*shape, size)) for size in (columns.size, 3 * m, n))
+        near_zero = np.zeros((0, memory.values.angles.size))
         for k, place in enumerate(places.tolist()):
             self._parameters.write(place)
-            evaluate_along(times[k], q[k], v[k], blocks[k], rows[k], forces[k], memory.packed.argument)
+            found = blocks[k], rows[k], forces[k]
+            evaluate_along(times[k], q[k], v[k], near_zero, *found, memory.packed.argument)
         self._model.put_numbers(memory.values, self._model.data)
         blocks = blocks.reshape(*shape, *columns.shape)
         phi, nu, gamma = np.split(rows, 3, axis=-1)

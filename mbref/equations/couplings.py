@@ -17,12 +17,12 @@ from mbref.scene.joints import ANGLE, Coordinate
 
 
 class Coupled(NamedTuple):
-    """A row: the sum of joint coordinates times factors is zero."""
+    """A row: the sum of polynomials of joint coordinates is zero; ``laws`` are coefficients of q, q², …"""
 
     name: str
     joints: tuple[Joint, ...]
     coordinates: tuple[Coordinate, ...]
-    factors: tuple[float, ...]
+    laws: tuple[tuple[float, ...], ...]
 
 
 class Rotors(NamedTuple):
@@ -73,11 +73,11 @@ def _rotor(joint: Joint, name: str, frame: str, length: float) -> tuple[Body, Jo
     kind = Revolute if turns else Translational
     held = kind.model_construct(name=name, type=kind.model_fields["type"].default, **places)
     coordinate = joint.facts.driven or ANGLE
-    return body, held, Coupled(name, (joint, held), (coordinate, coordinate), (-1.0, 1.0))
+    return body, held, Coupled(name, (joint, held), (coordinate, coordinate), ((-1.0,), (1.0,)))
 
 
 def couplings_of(scene: Scene) -> tuple[Coupled, ...]:
-    """Return the couplings of a scene, scaled such that the largest factor is one in size."""
+    """Return the couplings of a scene, scaled such that the largest factor of a coordinate is one in size."""
     if not scene.coupling:
         return ()
     found, joints = [], {joint.name: joint for joint in scene.joint}
@@ -85,8 +85,8 @@ def couplings_of(scene: Scene) -> tuple[Coupled, ...]:
         ends = coupling.ends(tuple(joints[name] for name in coupling.joints))
         size = largest_factor(coupling)
         named, coordinates = zip(*ends, strict=True)
-        factors = tuple(factor / size for factor in coupling.factors)
-        found.append(Coupled(coupling.name, named, coordinates, factors))
+        laws = tuple(tuple(each / size for each in law) for law in coupling.laws)
+        found.append(Coupled(coupling.name, named, coordinates, laws))
     return tuple(found)
 
 
@@ -98,4 +98,4 @@ def largest_factor(coupling: Coupling) -> float:
 def coordinate_primitives(coupled: Coupled) -> tuple[Primitive, ...]:
     """Return the primitives of a coupling, which share one row."""
     kinds, ends = (COUPLED_ANGLE, COUPLED_SLIDE), zip(*coupled[1:], strict=True)
-    return tuple(of_coordinate(joint, name, kinds, factor) for joint, name, factor in ends)
+    return tuple(of_coordinate(joint, name, kinds, law) for joint, name, law in ends)

@@ -77,14 +77,17 @@ def evaluate(t, q, v, equations):
     forces(t, equations)
 
 
-@entry(INT(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, EQUATIONS))
-def evaluate_along(times, q, v, blocks, rows, forces, equations):
+@entry(INT(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, EQUATIONS))
+def evaluate_along(times, q, v, angles, blocks, rows, forces, equations):
     """Call ``evaluate`` at k states from Python: Φ_q as blocks (k, width m), (Φ, ν, γ) (k, 3 m), g (k, n).
 
-    Arguments are times (k,), coordinates q (k, 7 nb) and velocities v (k, n). Returns k.
+    Arguments are times (k,), coordinates q (k, 7 nb) and velocities v (k, n); angles of joints are the
+    nearest ones to those in a row of ``angles`` (k, a), or in memory without rows. Returns k.
     """
     count, m = times.shape[0], equations.rows.phi.shape[0]
     for k in range(count):
+        if angles.shape[0] > 0:
+            copy(angles[k], equations.angles)
         select_pieces(times[k], equations)
         evaluate(times[k], q[k], v[k], equations)
         found = equations.system.blocks.reshape(-1)

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbref import rotations
+from mbref.equations.joint_angles import angles_of_pose
 from mbref.equations.lazy import LazyMapping
 from mbref.equations.model import Model
 from mbref.equations.offsets import assembled
@@ -28,38 +29,46 @@ OPEN = 1e-6  # singular value of unit rows / largest one: below it a combination
 SHARE = 1e-6  # weight of a joint in such a combination below which it does not take part
 
 
-def lazy_reactions(scene: Scene, times: np.ndarray, q: np.ndarray, multipliers: np.ndarray) -> dict[str, Any]:
+def lazy_reactions(
+    scene: Scene, times: np.ndarray, q: np.ndarray, multipliers: np.ndarray, angles: np.ndarray
+) -> dict[str, Any]:
     """Return ``reactions`` by joint, and ``open_reactions`` by joint and driver, of a Motion, without those
     that are not computed.
 
-    Arguments are times (k,) in s, q (k, nb, 7) and λ (k, m).
+    Arguments are times (k,) in s, q (k, nb, 7), λ (k, m), and angles (k, a) of turning joints since the
+    start.
     """
     if not scene.has_mass():
         return {}
     names = tuple(joint.name for joint in scene.joint)
-    found = {"reactions": LazyMapping(names, _reactions, scene, times, q, multipliers)}
+    found = {"reactions": LazyMapping(names, _reactions, scene, times, q, multipliers, angles)}
     if multipliers.shape[1] <= MOST_OPEN_ROWS:
         drivers = tuple(DRIVER.format(driver.joint) for driver in scene.driver)
-        found["open_reactions"] = LazyMapping(names + drivers, _open_dimensions, scene, times, q)
+        found["open_reactions"] = LazyMapping(names + drivers, _open_dimensions, scene, times, q, angles)
     return found
 
 
 def _reactions(
-    scene: Scene, times: np.ndarray, q: np.ndarray, multipliers: np.ndarray
+    scene: Scene, times: np.ndarray, q: np.ndarray, multipliers: np.ndarray, angles: np.ndarray
 ) -> dict[str, np.ndarray]:
     model = Model(assembled(scene))
-    found = least_reactions(model, q, model.terms(times, q).blocks, multipliers)
+    blocks = model.terms(times, q, angles=angles).blocks
+    found = least_reactions(model, q, blocks, multipliers, angles)
     model.release()
     return found
 
 
 def least_reactions(
-    model: Model, q: np.ndarray, blocks: np.ndarray, multipliers: np.ndarray
+    model: Model,
+    q: np.ndarray,
+    blocks: np.ndarray,
+    multipliers: np.ndarray,
+    angles: np.ndarray | None = None,
 ) -> dict[str, np.ndarray]:
     """Return ``reactions`` of least norm, if redundant rows leave a choice and are few."""
     if model.m <= MOST_OPEN_ROWS and model.once(_is_redundant):
         multipliers = _of_least_norm(model, blocks, multipliers)
-    return reactions(model, q, blocks, multipliers)
+    return reactions(model, q, blocks, multipliers, angles)
 
 
 def _is_redundant(model: Model) -> bool:
@@ -80,19 +89,26 @@ def _of_least_norm(model: Model, blocks: np.ndarray, multipliers: np.ndarray) ->
     return np.asarray(multipliers - part[..., 0] / units)
 
 
-def _open_dimensions(scene: Scene, times: np.ndarray, q: np.ndarray) -> dict[str, np.ndarray]:
+def _open_dimensions(
+    scene: Scene, times: np.ndarray, q: np.ndarray, angles: np.ndarray
+) -> dict[str, np.ndarray]:
     model = Model(assembled(scene))
-    blocks = model.terms(times, q).blocks
+    blocks = model.terms(times, q, angles=angles).blocks
     model.release()
     return open_dimensions(model, blocks)
 
 
 def reactions(
-    model: Model, q: np.ndarray, blocks: np.ndarray, multipliers: np.ndarray
+    model: Model,
+    q: np.ndarray,
+    blocks: np.ndarray,
+    multipliers: np.ndarray,
+    angles: np.ndarray | None = None,
 ) -> dict[str, np.ndarray]:
     """Return for each joint force (N) and moment (N m) (k, 6) on its second body at the anchor, world axes.
 
-    Arguments are q (k, nb, 7), the blocks (k, m, 12) of Φ_q and λ (k, m).
+    Arguments are q (k, nb, 7), the blocks (k, m, 12) of Φ_q, λ (k, m), and the angles (k, a) of turning
+    joints, by default within half a turn.
     """
     names = tuple(joint.name for joint in model.scene.joint)
     if not names:
@@ -105,12 +121,17 @@ def reactions(
     arm = model.anchors(q) - pose[..., :3]
     moment = rotations.rotate(pose[..., 3:], wrench[..., 3:]) - rotations.cross(arm, force)
     found = np.concatenate([force, moment], axis=-1)
-    _add_coupled(model, q, multipliers, names, found)
+    _add_coupled(model, q, multipliers, names, found, angles)
     return {name: found[:, j] for j, name in enumerate(names)}
 
 
 def _add_coupled(
-    model: Model, q: np.ndarray, multipliers: np.ndarray, names: Sequence[str], wrench: np.ndarray
+    model: Model,
+    q: np.ndarray,
+    multipliers: np.ndarray,
+    names: Sequence[str],
+    wrench: np.ndarray,
+    angles: np.ndarray | None,
 ) -> None:
     """Add the forces of couplings and armatures along the coordinates of joints to their wrenches (k, j, 6).
 
@@ -125,9 +146,32 @@ def _add_coupled(
         axis = rotations.cross(x, y) if turns else x
         if place.first < model.nb:
             axis = rotations.rotate(q[:, place.first, 3:], axis[None])
-        strength = -multipliers[:, primitives.row[p]] * primitives.length[p]
+        slope = primitives.length[p] + (_bend(model, q, p, angles) if primitives.higher[p].any() else 0.0)
+        strength = -multipliers[:, primitives.row[p]] * slope
         components = slice(3, 6) if turns else slice(0, 3)
         wrench[:, number[place.of], components] += strength[:, None] * axis
+
+
+def _bend(model: Model, q: np.ndarray, p: int, angles: np.ndarray | None) -> np.ndarray:
+    """Return the part (k,) of the slope of a coupled coordinate's polynomial that depends on the
+    coordinate."""
+    primitives, slot = model.data.primitives, int(model.data.primitives.angle[p])
+    if slot >= 0:
+        every = [angles_of_pose(model, each.ravel()) for each in q] if angles is None else angles
+        value = np.asarray(every)[:, slot]
+    else:
+        frame = np.broadcast_to([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (len(q), 1, 7))
+        first, second = (
+            np.concatenate([q, frame], axis=1)[:, body[p]] for body in (primitives.first, primitives.second)
+        )
+        ends = [
+            pose[:, :3] + rotations.rotate(pose[:, 3:], point[None])
+            for pose, point in ((first, primitives.point_first[p]), (second, primitives.point_second[p]))
+        ]
+        axis = rotations.rotate(first[:, 3:], primitives.direction_first[p][None])
+        value = ((ends[1] - ends[0]) * axis).sum(axis=1)
+    law = np.polynomial.Polynomial([0.0, 0.0, *primitives.higher[p]])
+    return np.asarray(law.deriv()(value))
 
 
 def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray]:
@@ -148,18 +192,20 @@ def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray]:
     return {name: np.sum(_singular_values(vanishing[:, own]) > SHARE, axis=1) for name, own in rows.items()}
 
 
-def determined_components(model: Model, q: np.ndarray, blocks: np.ndarray) -> dict[str, np.ndarray]:
+def determined_components(
+    model: Model, q: np.ndarray, blocks: np.ndarray, angles: np.ndarray | None = None
+) -> dict[str, np.ndarray]:
     """Return by joint which components (k, 6) of its reaction every solution of equilibrium shares.
 
-    Force and moment on the second body at the anchor, along world axes; from q (k, nb, 7) and the blocks (k,
-    m, 12) of Φ_q. A component is undetermined if a vanishing combination of rows, added to the multipliers,
-    changes the component.
+    Force and moment on the second body at the anchor, along world axes; from q (k, nb, 7), the blocks (k, m,
+    12) of Φ_q and angles as for ``reactions``. A component is undetermined if a vanishing combination of
+    rows, added to the multipliers, changes the component.
     """
     found = {joint.name: np.ones((len(q), 6), dtype=bool) for joint in model.scene.joint}
     vanishing, lengths = vanishing_combinations(model, blocks)
     units = np.repeat([model.length, 1.0], 3)
     for k in range(vanishing.shape[-1]):
-        for name, change in reactions(model, q, blocks, vanishing[..., k] / lengths).items():
+        for name, change in reactions(model, q, blocks, vanishing[..., k] / lengths, angles).items():
             found[name] &= np.abs(change * units) <= SHARE
     return found
 

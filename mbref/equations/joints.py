@@ -33,6 +33,7 @@ class Primitive(NamedTuple):
     second: Vector3 = ORIGIN
     turning: Vector3 = ORIGIN  # for drivers: direction in the first body, perpendicular to `first`
     length: float = 0.0  # length of a distance constraint, or the factor of a joint coordinate
+    higher: tuple[float, ...] = ()  # factors of the square of a joint coordinate, and of higher powers
     driven: bool = False
 
 
@@ -110,15 +111,21 @@ def in_plane(anchor: Vector3, normal: Vector3) -> Primitive:
 
 
 def of_coordinate(
-    joint: Joint, coordinate: Coordinate, kinds: tuple[int, int], factor: float = 0.0, driven: bool = False
+    joint: Joint,
+    coordinate: Coordinate,
+    kinds: tuple[int, int],
+    law: tuple[float, ...] = (0.0,),
+    driven: bool = False,
 ) -> Primitive:
     """Return the primitive of a joint's angle about, or displacement along, its axis.
 
     ``kinds`` are the kinds of primitives for an angle and for a displacement. A driver prescribes the
-    coordinate (``driven``); a coupling adds the coordinate times a factor to its row.
+    coordinate (``driven``); a coupling adds a polynomial of the coordinate, with coefficients ``law`` of its
+    first and higher powers, to its row.
     """
-    x, y, z = frame(joint.directions[0])
+    (x, y, z), (factor, *higher) = frame(joint.directions[0]), law
+    powers = tuple(higher)
     if coordinate == ANGLE:
-        return Primitive(kinds[0], first=x, turning=y, second=x, length=factor, driven=driven)
+        return Primitive(kinds[0], first=x, turning=y, second=x, length=factor, higher=powers, driven=driven)
     anchor = joint.anchor_pair[0]
-    return Primitive(kinds[1], anchor, anchor, first=z, length=factor, driven=driven)
+    return Primitive(kinds[1], anchor, anchor, first=z, length=factor, higher=powers, driven=driven)

@@ -150,10 +150,17 @@ class Model:
         """Coordinates (7 nb,) of the scene's poses, for principal frames."""
         return self._packs.start()[self._place]
 
-    def terms(self, times: float | np.ndarray, q: np.ndarray, v: np.ndarray | None = None) -> Terms:
+    def terms(
+        self,
+        times: float | np.ndarray,
+        q: np.ndarray,
+        v: np.ndarray | None = None,
+        angles: np.ndarray | None = None,
+    ) -> Terms:
         """Return the terms at a time (s), coordinates q (7 nb,) and velocities v (6 nb,), by default at rest.
 
-        For k times (k,), with q (k, 7 nb) and v (k, 6 nb), return the terms at k states.
+        For k times (k,), with q (k, 7 nb) and v (k, 6 nb), return the terms at k states. Angles of turning
+        joints are nearest to ``angles`` (a,) or (k, a), rad; by default they are within half a turn.
         """
         t = np.array(times, dtype=float, ndmin=1)
         q = np.ascontiguousarray(q, dtype=float).reshape(t.size, 7 * self.nb)
@@ -161,7 +168,13 @@ class Model:
         blocks, m = np.empty((t.size, self.entry_columns.size)), self.m
         rows = np.empty((t.size, 3 * m))
         forces = np.empty((t.size, self.n))
-        evaluate_along(t, q, v, blocks, rows, forces, self.memory.packed.argument)
+        reference = self.memory.values.angles
+        before = reference.copy()
+        counted = np.zeros((0, before.size))
+        if angles is not None:
+            counted = np.ascontiguousarray(angles, dtype=float).reshape(t.size, before.size)
+        evaluate_along(t, q, v, counted, blocks, rows, forces, self.memory.packed.argument)
+        reference[:] = before
         blocks = blocks.reshape(t.size, *self.entry_columns.shape)
         phi, nu, gamma = rows[:, :m], rows[:, m : 2 * m], rows[:, 2 * m :]
         found = Terms(self.structure, self.mass, blocks, phi, nu, gamma, forces)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -86,15 +87,14 @@ def counted_angles(scene: Scene, structure: Structure, angles: np.ndarray) -> di
 @functools.lru_cache(maxsize=64)
 def _at_offsets(scene: Scene) -> tuple[Scene, dict[str, float]]:
     """Return the scene at poses that obey its offsets, and the angles of joints from the given poses."""
-    offsets = {c.name: c.offset / largest_factor(c) for c in scene.coupling}
+    offsets = {c.name: c.offset for c in scene.coupling}
     found = scene.with_(coupling=[c.model_copy(update={"offset": 0.0}) for c in scene.coupling])
     angles = {joint.name: 0.0 for joint in scene.joint if joint.facts.turns}
-    value = np.array([offsets.get(name, 0.0) for name in Model(found).row_joint])
-    parts = 1
+    value, parts = _values(found, offsets), 1
     while parts < MOST_PARTS and not _is_near(found, value / parts):
         parts *= 2
     for part in range(parts):
-        model = Model(found)
+        model, value = Model(found), _values(found, offsets)
         q, residual = solve_positions(model, 0.0, model.start(), value / parts)
         gap = gaps(model.terms(0.0, q).less(value / parts), model.length)
         if not gap.max(initial=0.0) <= MET_OFFSET:
@@ -103,6 +103,15 @@ def _at_offsets(scene: Scene) -> tuple[Scene, dict[str, float]]:
         angles = {name: angle + float(steps[name][0]) for name, angle in angles.items()}
         found = placed_with_springs(model, q)
     return found, angles
+
+
+def _values(scene: Scene, offsets: Mapping[str, float]) -> np.ndarray:
+    """Return the value (m,) that offsets by name give to each row of a scene, which is divided by its largest
+    factor."""
+    sizes = {coupling.name: largest_factor(coupling) for coupling in scene.coupling}
+    return np.array(
+        [offsets[name] / sizes[name] if name in sizes else 0.0 for name in Model(scene).row_joint]
+    )
 
 
 def _is_near(scene: Scene, value: np.ndarray) -> bool:

@@ -28,6 +28,7 @@ from mbref.equations.load_numbers import (
     turning_joints,
 )
 from mbref.equations.parts import FRAME, all_parts, shape_of
+from mbref.equations.principal_axes import numbers_of_body, quaternions
 from mbref.equations.structure import (
     MOST_KEPT,
     Places,
@@ -48,7 +49,6 @@ from mbref.kernels.scene_layout import (
 )
 from mbref.scene import (
     GROUND,
-    Body,
     Joint,
     Scene,
 )
@@ -89,7 +89,7 @@ class Packs:
         bodies = self._bodies()
         lengths = self._lengths(joints)
         primitives, loads, turning = self._fixed_in_bodies(
-            self._in_order([rows for _, rows in of_joints], of_couplings)
+            self._in_order([rows for _, rows in of_joints], of_couplings), self._higher(of_couplings)
         )
         # gravity acts on the bodies of the scene, not on rotors or a modelled ground
         has_weight = np.arange(self.nb)[:, None] < (0 if self.kinematic else len(scenes[0].body))
@@ -118,6 +118,15 @@ class Packs:
         for k, pairs in enumerate(of_couplings):
             found += [numbers for rows in of_joints[k * count : (k + 1) * count] for numbers in rows]
             found += [vectors_of(primitive) for pair in pairs for primitive in pair]
+        return found
+
+    def _higher(self, of_couplings: Sequence[Sequence[tuple[Primitive, ...]]]) -> np.ndarray:
+        """Return the factors (s, p, powers) of higher powers of all primitives' joint coordinates."""
+        found = np.zeros((len(self.scenes), len(self.structure.kind), self.structure.places.powers))
+        for k, rows in enumerate(of_couplings if found.size else ()):
+            coordinates = [p for row in rows for p in row]
+            for p, primitive in enumerate(coordinates, found.shape[1] - len(coordinates)):
+                found[k, p, : len(primitive.higher)] = primitive.higher
         return found
 
     def _structure(
@@ -167,6 +176,7 @@ class Packs:
             anchored=tuple(body for bodies in ends for body in bodies),
             functions=tuple(len(function.pieces()) for function in functions),
             terms=max((len(function.coefficients) for function in functions), default=1),
+            powers=max((len(p.higher) for row in coupled for p in row), default=0),
         )
 
     def _of_couplings(self, primitives: Sequence[tuple[Primitive, ...]]) -> Iterator[PrimitivePlace]:
@@ -187,7 +197,7 @@ class Packs:
 
     def _bodies(self) -> Bodies:
         """Return masses and moments, positions and frames of the bodies, with the fixed frame last."""
-        found = [_once(_of_body, bodies) for bodies in self.listed]
+        found = [_once(numbers_of_body, bodies) for bodies in self.listed]
         # zeros for the fixed frame, whose quaternion without a vector part is no rotation
         numbers = np.zeros((len(self.scenes), self.nb + 1, 11))
         numbers[:, :-1] = self._rows((own for rows in found for own, _ in rows), 11)
@@ -196,7 +206,7 @@ class Packs:
             numbers[..., 7:] = 1.0
         self.turns_frames = any(each is not None for each in axes)
         frames = numbers[..., 3:7]
-        self.principal = _quaternions(axes).reshape(len(self.scenes), self.nb, 4)
+        self.principal = quaternions(axes).reshape(len(self.scenes), self.nb, 4)
         if self.turns_frames:
             frames[:, :-1] = rotations.multiply(frames[:, :-1], self.principal)
         self.to_local = np.ascontiguousarray(rotations.to_matrix(frames).swapaxes(-1, -2))
@@ -215,9 +225,12 @@ class Packs:
         anchored = self.structure.anchored
         return body_lengths(anchors - self._centres[:, anchored], anchored, self.nb)
 
-    def _fixed_in_bodies(self, of_primitives: Sequence[Values]) -> tuple[Primitives, Loads, TurningJoints]:
-        """Return primitives, loads and turning joints from the numbers of all primitives. Their vectors are
-        rotated to the principal frames of the bodies in one operation."""
+    def _fixed_in_bodies(
+        self, of_primitives: Sequence[Values], higher: np.ndarray
+    ) -> tuple[Primitives, Loads, TurningJoints]:
+        """Return primitives, loads and turning joints from the numbers of all primitives, and factors
+        (s, p, powers) of higher powers. Vectors are rotated to the principal frames of the bodies in one
+        operation."""
         structure, scenes = self.structure, () if self.kinematic else self.scenes
         numbers = self._rows(of_primitives, 16)
         named = [(scene, loaded_joints(scene)) for scene in scenes]
@@ -238,7 +251,7 @@ class Packs:
         places = (structure.kind, structure.first, structure.second, structure.driver, structure.row)
         places += (*structure.places_in_row,)
         directions = [vectors_of[:, :, k] for k in range(5)]
-        primitives = Primitives._make([*map(self._all, places), *directions, numbers[..., 15]])
+        primitives = Primitives._make([*map(self._all, places), *directions, numbers[..., 15], higher])
         ends, constants = [*map(self._all, structure.load)], [of_loads[..., k] for k in range(12, 15)]
         loads = Loads._make([*ends, of_loads[..., :3], *(others[:, :l, k] for k in range(3)), *constants])
         across = [others[:, l:, k] for k in range(3)]
@@ -299,32 +312,3 @@ def _once(function: Callable[[Any], Any], entries: Sequence[Any]) -> list[Any]:
     places = [*map(id, entries)]
     known = {place: function(entry) for place, entry in dict(zip(places, entries, strict=True)).items()}
     return [*map(known.__getitem__, places)]
-
-
-def _quaternions(axes: Sequence[np.ndarray | None]) -> np.ndarray:
-    """Return quaternions (k, 4) of rotation matrices, where None means no rotation."""
-    if all(each is None for each in axes):
-        unturned = np.zeros((len(axes), 4))
-        unturned[:, 0] = 1.0
-        return unturned
-    return rotations.from_matrix(np.array([np.eye(3) if each is None else each for each in axes]))
-
-
-def _of_body(body: Body) -> tuple[tuple[float, ...], np.ndarray | None]:
-    """Return position, orientation, mass and principal moments of a body, and the rotation from the principal
-    frame to its own frame (None if both frames are equal)."""
-    mass = 1.0 if body.mass is None else body.mass
-    moments, axes = _principal_axes(body.inertia)
-    return (*body.position, *body.orientation, mass, *moments), axes
-
-
-def _principal_axes(inertia: Any) -> tuple[Sequence[float], np.ndarray | None]:
-    """Return principal moments and the rotation from the principal frame to the body's frame; None if both
-    frames are equal."""
-    if inertia is None:
-        return (1.0, 1.0, 1.0), None
-    if not isinstance(inertia[0], tuple):
-        return inertia, None
-    moments, axes = np.linalg.eigh(np.array(inertia))
-    axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
-    return np.maximum(moments, 0.0), axes

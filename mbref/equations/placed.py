@@ -12,6 +12,7 @@ from mbref import rotations
 from mbref.equations.joint_angles import angles_by_joint, angles_of_pose
 from mbref.equations.model import Model
 from mbref.scene import Joint, Load, Scene, SlideSpring, TorsionSpring
+from mbref.scene.joints import DISPLACEMENT, Coordinate
 
 
 def placed(model: Model, q: np.ndarray) -> Scene:
@@ -31,31 +32,40 @@ def placed(model: Model, q: np.ndarray) -> Scene:
     return scene.with_(body=bodies, joint=joints, load=loads)
 
 
-def placed_with_springs(model: Model, q: np.ndarray, angles: Mapping[int, float] | None = None) -> Scene:
+def placed_with_springs(model: Model, q: np.ndarray, angles: Mapping[str, float] | None = None) -> Scene:
     """Return ``placed`` with springs of joints as long or as twisted as before: their natural angles and
-    displacements count from the new poses.
+    displacements, and polynomials of couplings, count from the new poses.
 
-    ``angles`` (rad) of torsion springs, by their number in the scene, may be more than half a turn.
+    ``angles`` (rad) of joints, by name, may be more than half a turn.
     """
     found, turned = placed(model, q), angles or {}
-    loads = [_with_natural_value(model, q, load, turned.get(k)) for k, load in enumerate(found.load)]
-    return found.with_(load=loads)
+    loads = [_with_natural_value(model, q, load, turned) for load in found.load]
+    couplings = [
+        each
+        if each.powers == 1
+        else each.from_pose(_coordinate(model, q, *model.scene.coupled(each)[0], turned))
+        for each in found.coupling
+    ]
+    return found.with_(load=loads, coupling=couplings)
 
 
-def _with_natural_value(model: Model, q: np.ndarray, load: Load, angle: float | None) -> Load:
+def _with_natural_value(model: Model, q: np.ndarray, load: Load, turned: Mapping[str, float]) -> Load:
     """Return a load whose natural angle or displacement counts from the pose q of the model."""
     if not isinstance(load, TorsionSpring | SlideSpring):
         return load
-    if isinstance(load, SlideSpring):
-        moved = _displacement(model, q, model.scene.joint_named(load.joint))
-    else:
-        moved = _angle(model, q, load.joint) if angle is None else angle
+    moved = _coordinate(model, q, model.scene.joint_named(load.joint), load.coordinate, turned)
     return load.model_copy(update={f"natural_{load.coordinate}": load.action.natural - moved})
 
 
-def _angle(model: Model, q: np.ndarray, joint: str) -> float:
-    """Return the angle of a joint at q, rad, within half a turn."""
-    return float(angles_by_joint(model.scene, model.structure, angles_of_pose(model, q)[None])[joint][0])
+def _coordinate(
+    model: Model, q: np.ndarray, joint: Joint, coordinate: Coordinate, turned: Mapping[str, float]
+) -> float:
+    """Return the displacement (m) or the angle (rad) of a joint at q, by default within half a turn."""
+    if coordinate == DISPLACEMENT:
+        return _displacement(model, q, joint)
+    if joint.name in turned:
+        return turned[joint.name]
+    return float(angles_by_joint(model.scene, model.structure, angles_of_pose(model, q)[None])[joint.name][0])
 
 
 def _displacement(model: Model, q: np.ndarray, joint: Joint) -> float:

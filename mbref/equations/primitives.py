@@ -10,10 +10,13 @@ rotation matrix of a body, the constraint equations Φ = 0 are
     distance   (d·d - l²) / (2 l) = 0
 
 A driver is a dot-1 constraint whose vector a turns in body i by the prescribed angle, or a dot-2 constraint
-minus the prescribed displacement.  A coupling is one row, the sum of two joint coordinates times factors:
+minus the prescribed displacement.  A coupling is one row, the sum of polynomials f(q) = c₁ q + c₂ q² + … of
+joint coordinates q:
 
     angle      arctan2(s, c),  s = (A_j u)·(A_i y),  c = (A_j u)·(A_i x)
     slide      (A_i a)·d
+
+Its rate is f'(q) q', and its γ contains -f''(q) q'².
 
 Jacobian columns multiply (δr, δπ') with δπ' the rotation in body axes; ν = -∂Φ/∂t and
 γ is what Φ_q q̈ must equal (Eqs. 2 and 3 of the paper).
@@ -149,7 +152,8 @@ def between(p, primitives, frames):
 
 @kernel
 def slide_of_joint(p, equations):
-    """Return a·d and its γ, and its derivatives: by the position of the second body, by both rotations."""
+    """Return a·d and its γ, its derivatives (by the position of the second body, by both rotations), and its
+    rate."""
     primitives, frames, rotation = equations.scene.primitives, equations.frames, equations.frames.rotation
     i, j = primitives.first[p], primitives.second[p]
     a, w_i = vector(primitives.direction_first, p), vector(frames.angular_velocity, i)
@@ -159,7 +163,7 @@ def slide_of_joint(p, equations):
     a_second = to_world(rotation, i, cross(w_i, cross(w_i, a)))
     gamma = -(dot(a_second, d) + 2.0 * dot(a_rate, d_rate) + dot(a_world, d_second))
     turn_i, turn_j = cross(a, add(to_body(rotation, i, d), s_i)), cross(s_j, to_body(rotation, j, a_world))
-    return dot(a_world, d), gamma, a_world, turn_i, turn_j
+    return dot(a_world, d), gamma, a_world, turn_i, turn_j, dot(a_rate, d) + dot(a_world, d_rate)
 
 
 @kernel
@@ -168,7 +172,7 @@ def dot2(p, t, equations):
     along it."""
     primitives, rows, blocks = equations.scene.primitives, equations.rows, equations.system.blocks
     row = primitives.row[p]
-    rows.phi[row], rows.gamma[row], along, turn_i, turn_j = slide_of_joint(p, equations)
+    rows.phi[row], rows.gamma[row], along, turn_i, turn_j, _ = slide_of_joint(p, equations)
     rows.nu[row] = 0.0
     if primitives.driver[p] >= 0:
         value, rate, acceleration = function_value(primitives.driver[p], t, equations)
@@ -202,8 +206,8 @@ def distance(p, equations):
 
 @kernel
 def joint_coordinate(p, equations):
-    """Add a joint coordinate times its factor to the row of a coupling; the first of the two coordinates
-    resets the row."""
+    """Add a polynomial of a joint coordinate to the row of a coupling; its first coordinate resets the
+    row."""
     primitives, rows, blocks = equations.scene.primitives, equations.rows, equations.system.blocks
     row = primitives.row[p]
     if primitives.begins[p]:
@@ -223,12 +227,24 @@ def unwrapped_angle(sine, cosine, reference):
     return angle + 2.0 * pi * floor((reference - angle) / (2.0 * pi) + 0.5)
 
 
+@inlined
+def polynomial(length, higher, q):
+    """Return f(q) = length q + higher[0] q² + …, f'(q) and f''(q)."""
+    over, slope, bend = 0.0, 0.0, 0.0  # f(q) / q, and its derivatives, by Horner's scheme
+    for k in range(higher.shape[0] - 1, -2, -1):
+        bend = bend * q + 2.0 * slope
+        slope = slope * q + over
+        over = over * q + (higher[k] if k >= 0 else length)
+    return over * q, over + slope * q, 2.0 * slope + bend * q
+
+
 @kernel
 def add_angle(p, equations):
-    """Add an angle to its row: its rate is (ω_j - ω_i)·h with h = u × (c y - s x) / (c² + s²)."""
+    """Add the polynomial of an angle to its row: the angle's rate is (ω_j - ω_i)·h with h = u × (c y - s x) /
+    (c² + s²)."""
     primitives, frames, rotation = equations.scene.primitives, equations.frames, equations.frames.rotation
     rows, blocks = equations.rows, equations.system.blocks
-    i, j, row, factor = primitives.first[p], primitives.second[p], primitives.row[p], primitives.length[p]
+    i, j, row = primitives.first[p], primitives.second[p], primitives.row[p]
     x = to_world(rotation, i, vector(primitives.direction_first, p))
     y = to_world(rotation, i, vector(primitives.turning_first, p))
     u = to_world(rotation, j, vector(primitives.direction_second, p))
@@ -243,20 +259,23 @@ def add_angle(p, equations):
     normal, normal_rate = cross(u, across), add(cross(u_rate, across), cross(u, across_rate))
     h = scale(1.0 / square, normal)
     h_rate = scale(1.0 / square, subtract(normal_rate, scale(square_rate, h)))
-    rows.phi[row] += factor * unwrapped_angle(s, c, equations.angles[primitives.angle[p]])
-    rows.gamma[row] -= factor * dot(subtract(w_j, w_i), h_rate)
+    angle, turning = unwrapped_angle(s, c, equations.angles[primitives.angle[p]]), subtract(w_j, w_i)
+    value, factor, bend = polynomial(primitives.length[p], primitives.higher[p], angle)
+    rows.phi[row] += value
+    rows.gamma[row] -= factor * dot(turning, h_rate) + bend * dot(turning, h) * dot(turning, h)
     accumulate(blocks[row], primitives.column_first[p] + 3, scale(-factor, to_body(rotation, i, h)))
     accumulate(blocks[row], primitives.column_second[p] + 3, scale(factor, to_body(rotation, j, h)))
 
 
 @kernel
 def add_displacement(p, equations):
-    """Add a displacement to the row of its coupling."""
+    """Add the polynomial of a displacement to the row of its coupling."""
     primitives, rows, blocks = equations.scene.primitives, equations.rows, equations.system.blocks
-    row, factor = primitives.row[p], primitives.length[p]
-    value, gamma, along, turn_i, turn_j = slide_of_joint(p, equations)
-    rows.phi[row] += factor * value
-    rows.gamma[row] += factor * gamma
+    row = primitives.row[p]
+    moved, gamma, along, turn_i, turn_j, rate = slide_of_joint(p, equations)
+    value, factor, bend = polynomial(primitives.length[p], primitives.higher[p], moved)
+    rows.phi[row] += value
+    rows.gamma[row] += factor * gamma - bend * rate * rate
     accumulate(blocks[row], primitives.column_first[p], scale(-factor, along))
     accumulate(blocks[row], primitives.column_first[p] + 3, scale(factor, turn_i))
     accumulate(blocks[row], primitives.column_second[p], scale(factor, along))

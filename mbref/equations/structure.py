@@ -59,7 +59,8 @@ class Places(NamedTuple):
     frame.
 
     ``anchored`` are the bodies of the joints' anchors, ``functions`` the numbers of pieces of the functions
-    of time, ``terms`` is the length of their longest polynomial.
+    of time, ``terms`` is the length of their longest polynomial, ``powers`` the number of powers above the
+    first in couplings.
     """
 
     nb: int
@@ -69,6 +70,7 @@ class Places(NamedTuple):
     anchored: tuple[int, ...]
     functions: tuple[int, ...]
     terms: int
+    powers: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +111,7 @@ class Structure:
             "m": m,
             "angles": self.turning.shape[1],
             "f": len(self.places.functions),
+            "powers": self.places.powers,
             "dense_rows": 0,
             "sides": sides,
             "width": 6 * sides,

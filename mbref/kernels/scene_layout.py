@@ -24,8 +24,8 @@ class Bodies(NamedTuple):
 class Primitives(NamedTuple):
     """Primitive constraints: bodies, first row, and vectors fixed in the first and the second body.
 
-    Two joint coordinates, COUPLED_ANGLE or COUPLED_SLIDE, share the row of a coupling. Each joint coordinate
-    adds its value times the factor in ``length`` to the row.
+    Joint coordinates q, COUPLED_ANGLE or COUPLED_SLIDE, share the row of a coupling. Each of them adds
+    ``length`` q + ``higher``[0] q² + … to the row.
     """
 
     kind: Annotated[Indices, "p"]
@@ -43,6 +43,7 @@ class Primitives(NamedTuple):
     turning_first: Annotated[Matrix, "p", 3]  # direction_first rotated by 90°, if a driver rotates it
     direction_second: Annotated[Matrix, "p", 3]
     length: Annotated[Vector, "p"]  # length of a distance constraint (m), or the factor of a joint coordinate
+    higher: Annotated[Matrix, "p", "powers"]  # factors of higher powers of a joint coordinate
 
 
 class TurningJoints(NamedTuple):

@@ -48,13 +48,15 @@ def violations(scene: Scene, motion: Trajectory) -> Violation:
         return _joined([violations(*part) for part in parts_of(scene, motion)])
     model = Model(without_armatures(assembled(scene)))
     q, v, a = coordinates(model, motion)
-    terms = model.terms(motion.times, q, v)
     counted = _from_start(scene, motion)
+    terms = model.terms(motion.times, q, v, _counted(model, counted))
     for coupled in couplings_of(model.scene):
-        ends = zip(coupled.joints, coupled.coordinates, coupled.factors, strict=True)
+        ends = zip(coupled.joints, coupled.coordinates, coupled.laws, strict=True)
         terms.phi[:, model.row_joint.index(coupled.name)] = sum(
-            factor * along(joint_motion(model.scene, counted, joint.name), coordinate)[0]
-            for joint, coordinate, factor in ends
+            np.polynomial.Polynomial([0.0, *law])(
+                along(joint_motion(model.scene, counted, joint.name), coordinate)[0]
+            )
+            for joint, coordinate, law in ends
         )
     velocity = np.einsum("kmn,kn->km", terms.jacobian, v) - terms.nu
     acceleration = None if a is None else np.einsum("kmn,kn->km", terms.jacobian, a) - terms.gamma
@@ -73,6 +75,15 @@ def _joined(parts: Sequence[Violation]) -> Violation:
         np.concatenate(velocity),
         np.concatenate(acceleration) if has_accelerations else None,
     )
+
+
+def _counted(model: Model, motion: Trajectory) -> np.ndarray | None:
+    """Return the angles (k, a) of turning joints with full turns, on which the slopes of polynomial couplings
+    depend; None without such couplings."""
+    if not model.structure.places.powers:
+        return None
+    turning = [place.joint for place in model.structure.places.turning]
+    return np.array([joint_motion(model.scene, motion, name).angle for name in turning]).T
 
 
 def _from_start(scene: Scene, motion: Trajectory) -> Trajectory:
@@ -94,7 +105,8 @@ def determined_reactions(scene: Scene, motion: Trajectory) -> dict[str, np.ndarr
     model = Model(without_armatures(assembled(scene)))
     q, _, _ = coordinates(model, motion)
     q = q.reshape(len(q), model.nb, 7)
-    found = determined_components(model, q, model.terms(motion.times, q).blocks)
+    angles = _counted(model, _from_start(scene, motion))
+    found = determined_components(model, q, model.terms(motion.times, q, angles=angles).blocks, angles)
     model.release()
     return found
 

@@ -1,13 +1,14 @@
 """Forces and torques of drivers from reactions of joints: inverse dynamics of driven and coupled coordinates.
 
 Along a joint coordinate q, the reaction on the second body is R = Σ driver + Σ coupling - I q'', with the
-armature I. A driver gives its force or torque to one coordinate; a coupling q₂ - ratio q₁ = 0 gives μ to q₂
-and -ratio μ to q₁, so that its power is zero.
+armature I. A driver gives its force or torque to one coordinate; a coupling q₂ - f(q₁) = 0 gives μ to q₂
+and -f'(q₁) μ to q₁, so that its power is zero.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -15,15 +16,17 @@ from mbref import rotations
 from mbref.equations.couplings import largest_factor
 from mbref.motions.joint_motion import (
     acceleration_of,
+    along,
     angular_acceleration_of,
     angular_velocity_of,
+    joint_motion,
     position_of,
     turned_since_start,
     velocity_of,
 )
 from mbref.motions.pieces import is_intermittent, parts_of
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import Joint, Scene
+from mbref.scene import Coupling, Joint, Scene
 from mbref.scene.joints import ANGLE, Coordinate
 
 # singular value / largest one below which drivers replace each other; ratios of couplings are scaled to 1
@@ -37,20 +40,33 @@ def driving_forces(scene: Scene, motion: Trajectory) -> dict[str, np.ndarray]:
     the motion lacks a reaction or an acceleration that it needs.
     """
     if is_intermittent(scene):
-        return _over_pieces([driving_forces(*part) for part in parts_of(scene, motion) if part[1].times.size])
+        parts = [driving_forces(*part) for part in parts_of(scene, motion) if part[1].times.size]
+        names = {driver.joint for driver in scene.driver}  # without contacts at end stops
+        return {name: force for name, force in _over_pieces(parts).items() if name in names}
     driven = [scene.joint_named(driver.joint) for driver in scene.driver]
-    unknown = [{(joint.name, joint.facts.driven): 1.0} for joint in driven]
-    for coupling in scene.coupling:
-        ends = zip(scene.coupled(coupling), coupling.factors, strict=True)
-        size = largest_factor(coupling)
-        unknown.append({(joint.name, kind): factor / size for (joint, kind), factor in ends})
+    unknown: list[dict[Any, Any]] = [{(joint.name, joint.facts.driven): 1.0} for joint in driven]
+    unknown += [_slopes(scene, motion, coupling) for coupling in scene.coupling]
     coordinates = list(dict.fromkeys(coordinate for shares in unknown for coordinate in shares))
     found = [_demanded(scene, motion, scene.joint_named(name), kind or ANGLE) for name, kind in coordinates]
     if any(each is None for each in found) or not driven:
         return {}
-    matrix = np.array([[shares.get(coordinate, 0.0) for shares in unknown] for coordinate in coordinates])
-    forces = np.linalg.pinv(matrix, rcond=REPLACEABLE) @ np.array(found)
+    each = np.ones(len(motion.times) if any(coupling.powers > 1 for coupling in scene.coupling) else 1)
+    rows = [[shares.get(coordinate, 0.0) * each for shares in unknown] for coordinate in coordinates]
+    shares_of = np.linalg.pinv(np.moveaxis(np.array(rows), 2, 0), rcond=REPLACEABLE)
+    forces = np.moveaxis(shares_of @ np.array(found).T[:, :, None], 0, 1)[..., 0]
     return {joint.name: size for joint, size in zip(driven, forces, strict=False)}
+
+
+def _slopes(scene: Scene, motion: Trajectory, coupling: Coupling) -> dict[Any, Any]:
+    """Return by joint and coordinate the derivative of a coupling's row, a number or (k,), over its largest
+    factor."""
+    found, size = {}, largest_factor(coupling)
+    for (joint, kind), law in zip(scene.coupled(coupling), coupling.laws, strict=True):
+        slope = np.polynomial.Polynomial([0.0, *law]).deriv()
+        bent = len(law) > 1
+        at = along(joint_motion(scene, motion, joint.name), kind)[0] if bent else 0.0
+        found[joint.name, kind] = slope(at) / size
+    return found
 
 
 def _over_pieces(parts: Sequence[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
@@ -70,10 +86,13 @@ def _demanded(scene: Scene, motion: Trajectory, joint: Joint, coordinate: Coordi
         return size
     if motion.acceleration is None or motion.angular_acceleration is None:
         return None
-    return np.asarray(size + joint.reflected_inertia * _acceleration(scene, motion, joint, coordinate))
+    second = coordinate_acceleration(scene, motion, joint, coordinate)
+    return np.asarray(size + joint.reflected_inertia * second)
 
 
-def _acceleration(scene: Scene, motion: Trajectory, joint: Joint, coordinate: Coordinate) -> np.ndarray:
+def coordinate_acceleration(
+    scene: Scene, motion: Trajectory, joint: Joint, coordinate: Coordinate
+) -> np.ndarray:
     """Return the second derivative (k,) of an angle, (ω₂ - ω₁)·a, or of a displacement, (r₂ - r₁)·a, with the
     axis a on the first body."""
     spins = [angular_velocity_of(scene, motion, name) for name in joint.bodies]

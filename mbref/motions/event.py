@@ -11,6 +11,7 @@ import numpy as np
 from mbref.motions.record_fields import typed
 
 STATE_BEFORE = ("position", "orientation", "velocity", "angular_velocity")
+NAME_LISTS = ("engaged", "released", "stops", "contacts", "chatter")
 EVENT_STATES = (*STATE_BEFORE, "velocity_after", "angular_velocity_after")
 
 
@@ -23,7 +24,7 @@ class Event:
     time : float
         s.
     engaged, released : tuple of str
-        Names of the joints and couplings that begin and cease to constrain.
+        Names of the joints and couplings that begin and cease to constrain, and of stops that are left.
     position, orientation : ndarray, shape (nb, 3) and (nb, 4)
         Centres of mass (m) and unit quaternions (w, x, y, z) of the nb bodies, world frame.
     velocity, angular_velocity : ndarray, shape (nb, 3)
@@ -40,6 +41,12 @@ class Event:
         have the least norm.
     energy_before, energy_after : float
         Kinetic energy, J, with the rotors of armatures. Moving drivers do work.
+    stops : tuple of str
+        End stops that coordinates meet, such as ``"A.upper"``.
+    contacts : tuple of str
+        End stops at which coordinates stay after the event.
+    chatter : tuple of str
+        End stops at which bounces end, because the next one would last less than 1e-6 of the end time.
     """
 
     time: float
@@ -56,6 +63,14 @@ class Event:
     open: Mapping[str, int]
     energy_before: float
     energy_after: float
+    stops: tuple[str, ...] = ()
+    contacts: tuple[str, ...] = ()
+    chatter: tuple[str, ...] = ()
+
+    @property
+    def jumps(self) -> bool:
+        """True if velocities jump: constraints begin to hold, or stops are met."""
+        return bool(self.engaged or self.stops)
 
     @property
     def sentence(self) -> str:
@@ -64,12 +79,16 @@ class Event:
         begin, end = "begin to hold" if several[0] else "begins to hold", "are" if several[1] else "is"
         parts = [f"{', '.join(self.engaged)} {begin}"] if self.engaged else []
         parts += [f"{', '.join(self.released)} {end} released"] if self.released else []
-        if self.engaged:
+        together = "are met at once" if len(self.stops) > 1 else "is met"
+        parts += [f"{', '.join(self.stops)} {together}"] if self.stops else []
+        parts += [f"contact at {', '.join(self.contacts)}"] if self.contacts else []
+        parts += [f"bounces end at {', '.join(self.chatter)}"] if self.chatter else []
+        if self.jumps:
             lost = self.energy_before - self.energy_after
             change = f"{lost:.6g} J lost" if lost >= 0.0 else f"{-lost:.6g} J supplied by drivers"
             parts.append(f"kinetic energy {self.energy_before:.6g} J → {self.energy_after:.6g} J, {change}")
         sizes = {name: float(np.linalg.norm(wrench[:3])) for name, wrench in self.impulses.items()}
-        if self.engaged and sizes:
+        if self.jumps and sizes:
             name = max(sizes, key=lambda each: sizes[each])
             parts.append(f"largest impulse {sizes[name]:.6g} N s in joint {name}")
         if any(self.open.values()):
@@ -87,7 +106,7 @@ class Event:
         found = {each.name: getattr(self, each.name) for each in fields(self)}
         found |= {key: found[key].tolist() for key in EVENT_STATES}
         found["impulses"] = {name: wrench.tolist() for name, wrench in self.impulses.items()}
-        names = {key: list(found[key]) for key in ("engaged", "released")}
+        names = {key: list(found[key]) for key in NAME_LISTS}
         return {**found, **names, "angles": dict(self.angles), "open": dict(self.open)}
 
     @staticmethod
@@ -106,5 +125,5 @@ class Event:
         """
         arrays = {key: np.array(record[key], dtype=float) for key in EVENT_STATES}
         impulses = {name: np.array(wrench, dtype=float) for name, wrench in record["impulses"].items()}
-        names = {key: tuple(record[key]) for key in ("engaged", "released")}
+        names = {key: tuple(record.get(key, ())) for key in NAME_LISTS}
         return typed(Event(**{**record, **arrays, **names, "impulses": impulses}))

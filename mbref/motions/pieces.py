@@ -5,7 +5,7 @@ The scene of a piece has the constraints that hold in it, and starts at the pose
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,7 @@ from mbref.motions.event import STATE_BEFORE, Event
 from mbref.motions.joint_motion import along, joint_motion, positions_of, turned_since_start
 from mbref.motions.restart import sample_at, scene_at
 from mbref.motions.trajectory import PER_BODY, Trajectory
-from mbref.scene import Coupling, Joint, Scene, SceneError
+from mbref.scene import Coupling, Driver, Joint, Scene, SceneError
 from mbref.scene.structure import intermittent
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ ALWAYS: dict[str, Any] = {"active": None, "engages": "anywhere"}
 
 
 def is_intermittent(scene: Scene) -> bool:
-    """Return whether a joint or a coupling has intervals."""
+    """Return whether a joint or a coupling has intervals, or a joint an end stop."""
     return any(True for _ in intermittent(scene))
 
 
@@ -44,20 +44,34 @@ def event_times(scene: Scene, end: float) -> list[float]:
 
 
 def first_piece(scene: Scene) -> Scene:
-    """Return the scene with the constraints that hold at t = 0."""
+    """Return the scene with the constraints that hold at t = 0, without contacts."""
     return scene.with_(**_holding(scene, 0.0))
+
+
+def in_contact(piece: Scene, contacts: Sequence[str]) -> Scene:
+    """Return a piece in which the joints of end stops, such as ``"A.upper"``, stay where they are."""
+    held = [Driver(joint=name.rpartition(".")[0], polynomial=(0.0,)) for name in contacts]
+    return piece.with_(driver=[*piece.driver, *held]) if held else piece
 
 
 def _holding(scene: Scene, t: float) -> dict[str, list[Any]]:
     """Return the joints and couplings that hold from t (s) on, as in the file, without intervals."""
     return {
-        key: [each.model_copy(update=ALWAYS) for each in getattr(scene, key) if each.is_active(t)]
+        key: [_permanent(each) for each in getattr(scene, key) if each.is_active(t)]
         for key in ("joint", "coupling")
     }
 
 
+def _permanent(constraint: Any) -> Any:
+    """Return a constraint without intervals and end stops."""
+    stops = {"stop": None} if getattr(constraint, "end_stop", None) else {}
+    return constraint.model_copy(update={**ALWAYS, **stops})
+
+
 def changes(scene: Scene, t: float) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the names of the joints and couplings that begin, and that cease, to constrain at t (s)."""
+    if t == 0.0:  # constraints that hold from the start do not begin
+        return (), ()
     every: tuple[Intermittent, ...] = (*scene.joint, *scene.coupling)
     ends = [{interval[side] for interval in each.active or ()} for side in (0, 1) for each in every]
     names = [each.name for each in (*scene.joint, *scene.coupling)]
@@ -86,14 +100,15 @@ def next_piece(scene: Scene, piece: Scene, state: Trajectory, t: float) -> tuple
     for coupling in scene.coupling:
         if coupling.name in engaged and coupling.engages == "given_pose":
             _refuse_coupling(scene, coupling, state, t)
-    couplings = [each.model_copy(update={"offset": 0.0}) for each in holding["coupling"]]
+    couplings = [_from_state(scene, each, state, {"offset": 0.0}) for each in holding["coupling"]]
     old = frame.with_(joint=placed.joint, coupling=placed.coupling)
     return old, frame.with_(joint=joints, coupling=couplings)
 
 
 def _always(scene: Scene) -> Scene:
     """Return the scene with the joints that always hold only, on which drivers and loads act."""
-    return scene.with_(joint=[joint for joint in scene.joint if joint.active is None], coupling=())
+    held = [_permanent(joint) for joint in scene.joint if joint.active is None]
+    return scene.with_(joint=held, coupling=())
 
 
 def _bare(scene: Scene) -> Scene:
@@ -158,12 +173,20 @@ def _refuse_coupling(scene: Scene, coupling: Coupling, state: Trajectory, t: flo
 
 
 def _sum(scene: Scene, coupling: Coupling, state: Trajectory) -> float:
-    """Return the sum of factor times coordinate of a coupling, m or rad, at a state."""
-    ends = zip(scene.coupled(coupling), coupling.factors, strict=True)
+    """Return the sum of the polynomials of a coupling's coordinates, m or rad, at a state."""
+    ends = zip(scene.coupled(coupling), coupling.laws, strict=True)
     terms = (
-        factor * along(joint_motion(scene, state, joint.name), kind)[0][0] for (joint, kind), factor in ends
+        np.polynomial.Polynomial([0.0, *law])(along(joint_motion(scene, state, joint.name), kind)[0][0])
+        for (joint, kind), law in ends
     )
     return float(sum(terms))
+
+
+def _from_state(scene: Scene, coupling: Coupling, state: Trajectory, fields: Mapping[str, Any]) -> Coupling:
+    """Return a coupling whose coordinates count from a state, with changed fields."""
+    joint, kind = scene.coupled(coupling)[0]
+    moved = along(joint_motion(scene, state, joint.name), kind)[0][0] if coupling.powers > 1 else 0.0
+    return coupling.from_pose(float(moved)).model_copy(update=fields)
 
 
 def cannot_hold(name: str, t: float, why: str) -> SceneError:
@@ -185,13 +208,14 @@ def parts_of(scene: Scene, motion: Trajectory) -> Iterator[tuple[Scene, Trajecto
         for key in ("joint", "coupling")
     }
     bare = scene.with_(load=(), **held)
-    piece, begin, turned = first_piece(bare), 0.0, dict[str, float]()
+    piece, begin, turned, contacts = first_piece(bare), 0.0, dict[str, float](), tuple[str, ...]()
     for event in (*motion.events, None):
         end = np.inf if event is None else event.time
-        yield piece, _samples(motion, (motion.times >= begin) & (motion.times < end), begin, turned)
+        chosen = (motion.times >= begin) & (motion.times < end)
+        yield in_contact(piece, contacts), _samples(motion, chosen, begin, turned)
         if event is not None:
             _, piece = next_piece(bare, piece, state_at(motion, event), event.time)
-            begin, turned = event.time, dict(event.angles)
+            begin, turned, contacts = event.time, dict(event.angles), event.contacts
 
 
 def restarted(scene: Scene, motion: Trajectory, t: float) -> Scene:
@@ -210,7 +234,10 @@ def restarted(scene: Scene, motion: Trajectory, t: float) -> Scene:
     state = _samples(motion, np.arange(len(motion.times)) == k, 0.0, {})
     joints, couplings = [], []
     for joint in scene.joint:
-        later = _from_time(joint, at)
+        later: dict[str, Any] = _from_time(joint, at)
+        if joint.end_stop and joint.facts.driven:
+            moved = along(joint_motion(scene, state, joint.name), joint.facts.driven)[0][0]
+            later["stop"] = joint.end_stop.from_place(float(moved))
         if joint.name in placed:
             joints.append(placed[joint.name].model_copy(update={**later, "engages": joint.engages}))
         elif later["active"]:
@@ -224,7 +251,7 @@ def restarted(scene: Scene, motion: Trajectory, t: float) -> Scene:
         holds = coupling.is_active(at)
         offset = 0.0 if holds else coupling.offset - _sum(scene, coupling, state)
         if holds or later["active"]:
-            couplings.append(coupling.model_copy(update={**later, "offset": offset}))
+            couplings.append(_from_state(scene, coupling, state, {**later, "offset": offset}))
     return frame.with_(joint=joints, coupling=couplings)
 
 

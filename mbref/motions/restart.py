@@ -11,6 +11,7 @@ from mbref.input_error import InputError
 from mbref.motions.joint_motion import joint_motion
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Load, Scene, TorsionSpring
+from mbref.scene.joints import ANGLE
 
 SAME_TIME = 1e-9  # difference of times / largest sample time that is rounding of a user's number
 
@@ -25,13 +26,14 @@ def scene_at(scene: Scene, motion: Trajectory, t: float) -> Scene:
     q = poses(model, motion.position[k : k + 1, order], motion.orientation[k : k + 1, order])
     model.release()
     angles, turned = angles_at_start(scene), {}
-    for number, load in enumerate(scene.load):
-        if isinstance(load, TorsionSpring):
-            angle = joint_motion(scene, motion, load.joint).angle
-            assert angle is not None  # such springs act on joints that turn
-            turned[number] = float(angle[k]) - angles[load.joint]
-            if np.isnan(turned[number]):
-                raise InputError(f"scene_at: the motion has lost count of the turns of joint {load.joint!r}")
+    counted = [load.joint for load in scene.load if isinstance(load, TorsionSpring)]
+    bent = (scene.coupled(coupling)[0] for coupling in scene.coupling if coupling.powers > 1)
+    for name in counted + [joint.name for joint, coordinate in bent if coordinate == ANGLE]:
+        angle = joint_motion(scene, motion, name).angle
+        assert angle is not None  # such springs and couplings act on joints that turn
+        turned[name] = float(angle[k]) - angles[name]
+        if np.isnan(turned[name]):
+            raise InputError(f"scene_at: the motion has lost count of the turns of joint {name!r}")
     placed, at = placed_with_springs(model, q[0], turned), float(motion.times[k])
     bodies = [
         body.model_copy(update={"velocity": tuple(v.tolist()), "angular_velocity": tuple(w.tolist())})

@@ -10,10 +10,10 @@ of the faulty value.
 from __future__ import annotations
 
 from mbref.scene.bodies import Body, Driver
+from mbref.scene.couplings import Coupling
 from mbref.scene.functions import Factor, Sine, TimeFunction
 from mbref.scene.joints import (
     JOINT_TYPES,
-    Coupling,
     Cylindrical,
     Distance,
     Fixed,

@@ -5,24 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, get_args
 
+from mbref.scene.couplings import default_coordinates
 from mbref.scene.fields import field_of
 from mbref.scene.function_faults import QUANTITY_OF, Faults, listed
-from mbref.scene.joints import JOINT_TYPES, Coordinate, default_coordinates
+from mbref.scene.joints import JOINT_TYPES, Coordinate
 from mbref.scene.units import QUANTITIES, dimension_of, fits, unit
 
 COORDINATES = get_args(Coordinate)
+LAWS = ("ratio", "ratios", "polynomial")  # of which a coupling has one
 
 
 def count_faults(path: str, coupling: Any, count: int) -> Faults:
     """Yield ratios and coordinates that are not one for each joint, and ratios that are missing or given
     twice."""
-    ratio, ratios = field_of(coupling, "ratio"), field_of(coupling, "ratios")
-    if ratio is None and ratios is None:
+    given = [name for name in LAWS if field_of(coupling, name) is not None]
+    if not given:
         yield f"{path}.{'ratio' if count == 2 else 'ratios'}", "is required"
-    elif ratio is not None and ratios is not None:
-        yield f"{path}.ratios", "or ratio, not both"
-    elif ratio is not None and count != 2:
-        yield f"{path}.ratio", f"relates two joints; {count} joints need ratios, one for each"
+    elif len(given) > 1:
+        yield f"{path}.{given[1]}", f"or {given[0]}, not both"
+    elif given != ["ratios"] and count != 2:
+        yield f"{path}.{given[0]}", f"relates two joints; {count} joints need ratios, one for each"
     for field in ("ratios", "coordinates"):
         given = field_of(coupling, field)
         if isinstance(given, list | tuple) and len(given) != count:
@@ -52,9 +54,12 @@ def _unit_faults(path: str, coupling: Any, ends: Sequence[tuple[str, str]]) -> F
     offset, ratio = field_of(coupling, "offset"), field_of(coupling, "ratio")
     if not fits(offset, QUANTITY_OF[last]):
         yield f"{path}.offset", f"is of the {last} of {name!r}, got {offset!r}"
-    ratios = [("ratio", ratio)] if ratio is not None else []
-    ratios += [(f"ratios[{k}]", each) for k, each in enumerate(listed(field_of(coupling, "ratios")))]
-    for (field, value), (_, coordinate) in zip(ratios, ends, strict=False):
-        over, under = (QUANTITIES[QUANTITY_OF[each]][0] for each in (last, coordinate))
-        if dimension_of(value) not in (None, unit(f"{over}/{under}").dimension):
-            yield f"{path}.{field}", f"is in {over}/{under}, got {value!r}"
+    over, *under = (QUANTITIES[QUANTITY_OF[each]][0] for each in (last, *(kind for _, kind in ends)))
+    ratios = [("ratio", ratio, under[0])] if ratio is not None else []
+    every = enumerate(zip(listed(field_of(coupling, "ratios")), under, strict=False))
+    ratios += [(f"ratios[{k}]", each, of) for k, (each, of) in every]
+    powers = enumerate(listed(field_of(coupling, "polynomial")))
+    ratios += [(f"polynomial[{k}]", each, f"{under[0]}^{k + 1}" if k else under[0]) for k, each in powers]
+    for field, value, of in ratios:
+        if dimension_of(value) not in (None, unit(f"{over}/{of}").dimension):
+            yield f"{path}.{field}", f"is in {over}/{of}, got {value!r}"

@@ -1,18 +1,15 @@
-"""Joints and couplings as data: the fields of every joint type, and its facts, from which all tables of joint
-types follow."""
+"""Joints as data: the fields of every joint type, and its facts, from which all tables of joint types
+follow."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
-from pydantic import BeforeValidator, Discriminator, field_validator
+from pydantic import Discriminator, field_validator
 
 from mbref.scene.fields import (
-    LengthOrAngle,
-    Measure,
     Name,
     Pair,
     PointPair,
@@ -21,12 +18,10 @@ from mbref.scene.fields import (
     RotorMass,
     VectorPair,
     VectorValue,
-    as_list,
-    checked_length,
     direction,
-    shown,
 )
 from mbref.scene.intervals import Intermittent
+from mbref.scene.stops import Stop
 
 X, Y, Z = 0, 1, 2
 SKEW = 0.05  # largest cosine between the axes of a universal joint that counts as a rounded right angle
@@ -112,6 +107,11 @@ class JointEntry(Intermittent):
         """The ``armature`` of the driven coordinate, kg m² or kg; 0 for joints without this field."""
         return 0.0
 
+    @property
+    def end_stop(self) -> Stop | None:
+        """The ``stop`` of the coordinate that a driver could prescribe; None for joints without one."""
+        return None
+
 
 class _AnchorJoint(JointEntry):
     anchor: PointValue
@@ -133,10 +133,15 @@ class _AxisJoint(_AnchorJoint):
 
 class _TurningJoint(_AxisJoint):
     armature: RotorInertia = 0.0  # kg m², of the driven angle q: the kinetic energy ½ armature q'²
+    stop: Stop | None = None
 
     @property
     def reflected_inertia(self) -> float:
         return self.armature
+
+    @property
+    def end_stop(self) -> Stop | None:
+        return self.stop
 
 
 class Fixed(_AnchorJoint):
@@ -197,10 +202,15 @@ class Translational(_AxisJoint):
     facts = JointFacts((X, Y), (X, Y, Z), driven="displacement", loaded=(DISPLACEMENT,))
     type: Literal["translational"] = "translational"
     armature: RotorMass = 0.0
+    stop: Stop | None = None
 
     @property
     def reflected_inertia(self) -> float:
         return self.armature
+
+    @property
+    def end_stop(self) -> Stop | None:
+        return self.stop
 
 
 class Cylindrical(_TurningJoint):
@@ -250,67 +260,3 @@ Joint = Annotated[
 JOINT_TYPES: dict[str, type[Joint]] = {
     joint.model_fields["type"].default: joint for joint in get_args(get_args(Joint)[0])
 }
-
-
-class Coupling(Intermittent):
-    """q₂ = offset + ratio · q₁ of two joint coordinates, or Σ ratios[k] q_k = offset of two or more: gears,
-    racks, belts, screws, mimic joints; differentials, pulleys, planetary gears.
-
-    A coordinate is the angle about a joint's axis (rad, full turns counted) or the displacement along it (m),
-    of the second body relative to the first. All coordinates are zero at the poses that the scene gives;
-    with an ``offset`` the motion starts at other poses (see ``Scene.assembled``). ``coordinates`` names the
-    coordinate of each joint. The default is the only coordinate of the joint, or the angle of a cylindrical
-    joint; for one joint named twice, its angle and its displacement.
-    """
-
-    name: Name
-    joints: Annotated[tuple[Name, ...], BeforeValidator(as_list)]
-    ratio: Measure | None = None  # rad/rad, m/rad, rad/m or m/m
-    ratios: Annotated[tuple[Measure, ...], BeforeValidator(as_list)] | None = None  # over the last coordinate
-    offset: LengthOrAngle = 0.0  # rad or m, of the last coordinate
-    coordinates: Annotated[tuple[Coordinate, ...], BeforeValidator(as_list)] | None = None
-
-    @field_validator("joints")
-    @classmethod
-    def _joints_are_several(cls, joints: tuple[str, ...]) -> tuple[str, ...]:
-        if len(joints) < 2:
-            raise ValueError(f"must be two or more names of joints, got {shown(list(joints))}")
-        return joints
-
-    @field_validator("ratio", "ratios")
-    @classmethod
-    def _no_ratio_is_zero(cls, value: Any) -> Any:
-        for ratio in value if isinstance(value, tuple) else () if value is None else (value,):
-            if ratio == 0.0:
-                last = "would lock the second joint" if value == 0.0 else "would leave out its joint"
-                raise ValueError(f"must not be 0, which {last}")
-            checked_length(abs(ratio))
-        return value
-
-    @property
-    def factors(self) -> tuple[float, ...]:
-        """Factors of the joint coordinates, whose sum is the offset: ``ratios``, or (-ratio, 1)."""
-        return self.ratios or (-(self.ratio or 0.0), 1.0)
-
-    @property
-    def gear_ratio(self) -> float:
-        """Ratio r of a coupling of two joints, q₂ = offset + r · q₁."""
-        first, second = self.factors
-        return -first / second
-
-    def ends(self, joints: tuple[Joint, ...]) -> tuple[tuple[Joint, Coordinate], ...]:
-        """Return the joints, each with its coupled coordinate."""
-        chosen = self.coordinates or default_coordinates(self.joints, [joint.facts for joint in joints])
-        return tuple(zip(joints, chosen, strict=True))
-
-
-def default_coordinates(names: Sequence[str], facts: Sequence[JointFacts]) -> tuple[Coordinate, ...]:
-    """Return the default coordinates of a coupling of joints with these names and facts: for a joint that is
-    named twice its angle, then its displacement."""
-    found: list[Coordinate] = []
-    for k, (name, each) in enumerate(zip(names, facts, strict=True)):
-        if list(names).count(name) > 1:
-            found.append(DISPLACEMENT if name in names[:k] else ANGLE)
-        else:
-            found.append(each.driven or (*each.coordinates, ANGLE)[0])
-    return tuple(found)

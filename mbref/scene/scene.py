@@ -10,9 +10,10 @@ from pydantic import Field, ValidationError, model_validator
 
 from mbref.files import write
 from mbref.scene.bodies import Body, Driver
+from mbref.scene.couplings import Coupling
 from mbref.scene.fields import Acceleration, EntryType, LaterTime, Name, SceneEntry, Three
 from mbref.scene.functions import Factor, Sine
-from mbref.scene.joints import Coordinate, Coupling, Joint
+from mbref.scene.joints import Coordinate, Joint
 from mbref.scene.loads import Load
 from mbref.scene.paths import replaced_at
 from mbref.scene.toml import as_lists, read_toml, scene_text, with_lines

@@ -19,16 +19,18 @@ SAME_DIRECTION = 1e-12  # 1 - cosine of the angle of axes that count as parallel
 
 
 def intermittent(scene: Scene) -> Iterator[str]:
-    """Yield the path of each joint and coupling that has intervals, such as ``joint[latch].active``."""
+    """Yield the path of each joint and coupling that has intervals, such as ``joint[latch].active``, and of
+    each end stop."""
     yield from (f"joint[{joint.name}].active" for joint in scene.joint if joint.active is not None)
     yield from (f"coupling[{each.name}].active" for each in scene.coupling if each.active is not None)
+    yield from (f"joint[{joint.name}].stop" for joint in scene.joint if joint.end_stop)
 
 
 def refuse_intervals(scene: Scene) -> None:
     """Raise SceneError for the first constraint with intervals, where only one set of constraints can be."""
     for path in intermittent(scene):
         raise SceneError(
-            [f"{path}: only motions have intervals (mbref run, plot, animate); remove them here"]
+            [f"{path}: only motions have intervals and stops (mbref run, plot, animate); remove them here"]
         )
 
 

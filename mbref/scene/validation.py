@@ -99,6 +99,7 @@ def field_faults(error: ValidationError, tables: Mapping[str, Sequence[str]]) ->
             "extra_forbidden": f"is not a known field{_meant_field(fault['loc'], tables)}",
             "greater_than": f"must be positive, got {got}",
             "greater_than_equal": f"must not be negative, got {got}",
+            "less_than_equal": f"must be at most {limit.get('le')}, got {got}",
             "finite_number": f"must be finite, got {got}",
             "float_type": f"must be a number, got {got}",
             "string_type": f"must be a string, got {got}",

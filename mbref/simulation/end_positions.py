@@ -73,7 +73,7 @@ def _rank(run: Run, t: float, q: np.ndarray) -> int:
 def _singular_values(run: Run, t: float, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return singular values and left singular vectors (m, m) of Φ_q with unit rows and columns scaled to
     unit length."""
-    terms, model = run.model.terms(t, q), run.model
+    terms, model = run.model.terms(t, q, angles=run.memory.equations.angles), run.model
     left, values, _ = np.linalg.svd(unit_rows(terms.jacobian * model.data.metric_root))
     return np.concatenate([values, np.zeros(model.m)]), left
 
@@ -93,7 +93,7 @@ def is_at_dead_position(run: Run) -> bool:
     if not run.scene.driver or model.m > MOST_DRIVEN_ROWS or not np.isfinite(state.coordinates).all():
         return False
     now, length = float(run.memory.loop.clock.time), model.length
-    terms = model.terms(now, state.coordinates)
+    terms = model.terms(now, state.coordinates, angles=run.memory.equations.angles)
     jacobian = terms.jacobian * np.tile(np.repeat([length, 1.0], 3), model.nb)
     velocities = np.linalg.lstsq(jacobian, terms.nu, rcond=ROUNDED)[0]
     rate = np.abs(terms.nu).max() * max(1.0, 1.0 / length)

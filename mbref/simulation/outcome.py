@@ -109,7 +109,7 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion
         **facts_of(run),
         times=times,
         **model.motion(q, v, a),
-        **lazy_reactions(run.scene, times, q, multipliers),
+        **lazy_reactions(run.scene, times, q, multipliers, angles),
         angles=counted_angles(run.scene, model.structure, angles),
         outcome=OUTCOMES[status],
         t_end=float(loop.clock.time),

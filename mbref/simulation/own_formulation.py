@@ -247,7 +247,7 @@ class _OwnRun:
             bodies=tuple(body.name for body in self.scene.body),
             times=times,
             **model.motion(poses, rates, second),
-            **lazy_reactions(self.scene, times, poses, multipliers),
+            **lazy_reactions(self.scene, times, poses, multipliers, angles),
             angles=counted_angles(self.scene, model.structure, angles),
             outcome=outcome,
             t_end=self.t,

@@ -9,19 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from mbref.equations.impacts import impact
 from mbref.equations.lazy import LazyMapping, LazySequence
 from mbref.input_error import InputError
 from mbref.motions.crossing import Crossing
 from mbref.motions.event import STATE_BEFORE, Event
 from mbref.motions.motion import Motion
-from mbref.motions.pieces import cannot_hold, changes, event_times, first_piece, next_piece
+from mbref.motions.pieces import cannot_hold, changes, event_times, first_piece, in_contact, next_piece
 from mbref.motions.trajectory import PER_BODY, Cost, Outcome, Trajectory
 from mbref.scene import Joint, Scene, SceneError
 from mbref.scene.bodies import DRIVER
+from mbref.simulation.end_stops import EndStops, with_impact
 from mbref.stepping.limits import Limits
 from mbref.stepping.run import missing_masses
 
+MOST_EVENTS = 1000  # events of a scene with end stops, at which a run ends
 Reached = Callable[[float], None] | None
 RunOfPiece = Callable[[Scene, np.ndarray, Reached], Motion]  # of a scene, at times (k,), s
 
@@ -47,20 +48,36 @@ def simulate_pieces(
         raise InputError("branches: cannot be chosen in a scene whose joints or couplings have intervals")
     if not scene.has_mass():
         raise SceneError(missing_masses(scene))
-    begins = [0.0, *event_times(scene, float(times[-1]))]
+    stops = EndStops(scene, lambda scene, times: run(scene, times, None), float(times[-1]))
+    begin, ends = 0.0, event_times(scene, float(times[-1]))
     piece, pieces, events, turned = first_piece(scene), [], [], dict[str, float]()
-    for begin, end in zip(begins, [*begins[1:], None], strict=True):
-        own = times[(times >= begin) & (times < end)] if end else times[times >= begin]
+    contacts: tuple[str, ...] = ()
+    if stops.sides and stops.starts(start := run(piece, np.zeros(1), None)):
+        piece, event = _event(scene, piece, (), _end(start, 0.0, turned), turned, stops)
+        contacts, events = event.contacts, [event]
+    while True:
+        end = next((time for time in ends if time > begin), None)
+        last = float(times[-1]) if end is None else end
+        met = stops.first_event(piece, contacts, turned, last - begin)
+        end = end if met is None else begin + met
+        own = times[(times >= begin) & (times < end)] if end is not None else times[times >= begin]
         local = own - begin if end is None else np.append(own - begin, end - begin)
-        motion = run(piece, local if local.size else np.zeros(1), _later(progress, begin))
+        motion = run(
+            in_contact(piece, contacts), local if local.size else np.zeros(1), _later(progress, begin)
+        )
         pieces.append(_Piece(begin, motion, min(own.size, len(motion.times))))
         if end is None or motion.outcome is not Outcome.COMPLETED:
             break
         state = _end(motion, end, turned)
         turned = {name: float(angles[0]) for name, angles in (state.angles or {}).items()}
-        before, piece = next_piece(scene, piece, state, end)
-        piece, event = _event(scene, before, piece, state, turned)
+        piece, event = _event(scene, piece, contacts, state, turned, stops)
+        contacts, begin = event.contacts, end
         events.append(event)
+        if stops.sides and len(events) >= MOST_EVENTS:
+            why = f"{MOST_EVENTS} events at end stops were met up to t = {end:.6g} s"
+            failed = replace(motion, outcome=Outcome.STEP_FAILED, message=why)
+            pieces[-1] = replace(pieces[-1], motion=failed)
+            break
     return _joined(scene, times, pieces, events)
 
 
@@ -79,33 +96,42 @@ def _end(motion: Motion, t: float, turned: dict[str, float]) -> Trajectory:
 
 
 def _event(
-    scene: Scene, before: Scene, after: Scene, state: Trajectory, turned: Mapping[str, float]
+    scene: Scene,
+    piece: Scene,
+    contacts: tuple[str, ...],
+    state: Trajectory,
+    turned: Mapping[str, float],
+    stops: EndStops,
 ) -> tuple[Scene, Event]:
-    """Return the scene after an event, with its velocities, and the event."""
+    """Return the scene after an event, with its velocities and without contacts, and the event.
+
+    ``piece`` is the scene before it, with these contacts.
+    """
     t = float(state.times[0])
+    before, after = next_piece(scene, piece, state, t)
     engaged, released = changes(scene, t)
     try:
-        found = impact(before, after)
+        met = stops.meet(in_contact(before, contacts), after, state, contacts)
     except SceneError as fault:
         raise cannot_hold(", ".join(engaged), t, fault.faults[0]) from None
-    bodies = [
-        body.model_copy(update={"velocity": tuple(v.tolist()), "angular_velocity": tuple(w.tolist())})
-        for body, v, w in zip(after.body, found.velocity, found.angular_velocity, strict=True)
-    ]
+    found = met.found
     event = Event(
         time=t,
         engaged=engaged,
-        released=released,
+        released=(*released, *(name for name in contacts if name not in met.contacts)),
+        stops=met.hits,
+        contacts=met.contacts,
+        chatter=met.chatter,
         **{key: getattr(state, key)[0] for key in STATE_BEFORE},
         velocity_after=found.velocity,
         angular_velocity_after=found.angular_velocity,
         angles={joint.name: turned[joint.name] for joint in scene.joint if _is_counted(joint)},
-        impulses={name: wrench * bool(engaged) for name, wrench in found.impulses.items()},
+        impulses={name: wrench * bool(engaged or met.hits) for name, wrench in found.impulses.items()},
         open=found.open,
         energy_before=found.energy[0],
         energy_after=found.energy[1],
     )
-    return after.with_(body=bodies), event
+    return with_impact(after, found), event
 
 
 def _joined(scene: Scene, times: np.ndarray, pieces: Sequence[_Piece], events: Sequence[Event]) -> Motion:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from mbref.kernels.compilation import exchangeable, inlined, kernel
 from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.linear_algebra.vectors import larger
-from mbref.taylor.angles import add_angle_rates, add_angles
+from mbref.taylor.coupled_coordinates import add_coordinates, add_rates, has_coordinates
 from mbref.taylor.generated_calls import close_by_code, violation_by_code
 from mbref.taylor.layout import CORRECT
 from mbref.taylor.partition import least_pivot
@@ -43,8 +43,8 @@ def violation_in_loops(memory):
         store(total, phi, block * WIDTH)
     for e in range(rows.linear_row.shape[0]):
         phi[nz + rows.linear_row[e]] += rows.linear_weight[e] * terms[0, rows.linear_lane[e]]
-    if memory.polynomials.torsions.row.shape[0] > 0:
-        add_angles(memory)
+    if has_coordinates(memory.polynomials):
+        add_coordinates(memory)
 
 
 @inlined
@@ -64,8 +64,8 @@ def violation_rate_in_loops(memory):
         store(total, phi, block * WIDTH)
     for e in range(rows.linear_row.shape[0]):
         phi[nz + rows.linear_row[e]] += rows.linear_weight[e] * terms[1, rows.linear_lane[e]]
-    if memory.polynomials.torsions.row.shape[0] > 0:
-        add_angle_rates(memory)
+    if has_coordinates(memory.polynomials):
+        add_rates(memory)
 
 
 @inlined

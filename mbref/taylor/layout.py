@@ -26,6 +26,8 @@ class Series(NamedTuple):
     springs: Annotated[Matrix, "7*springs", "orders"]
     torsions: Annotated[Matrix, "15*torsions", "orders"]  # directions (9), cosine, sine, angle, three moments
     slides: Annotated[Matrix, "8*slides", "orders"]  # axis (3), vector (3), displacement, force
+    # derivatives of the polynomials of coupled angles, then of coupled displacements, from the first one on
+    slopes: Annotated[Matrix, "(powers + 1)*(torsions + slides)", "orders"]
     factors: Annotated[Matrix, "f", "orders"]  # functions of time that multiply loads
     left: Annotated[Matrix, "orders", "slots"]  # factors of the products, one order later
     right: Annotated[Matrix, "orders", "slots"]

@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mbref import rotations
-from mbref.kernels.scene_layout import ABOUT_AXIS, ALONG_AXIS, FORCE, MOMENT, SPRING, Loads, SceneData
+from mbref.kernels.scene_layout import (
+    ABOUT_AXIS,
+    ALONG_AXIS,
+    COUPLED_ANGLE,
+    FORCE,
+    MOMENT,
+    SPRING,
+    Loads,
+    SceneData,
+)
 from mbref.taylor.forms import Forms, sum_of_products
 from mbref.taylor.numbers import array_of
 from mbref.taylor.polynomial_layout import Slides, Springs, TimedForces, Torsions
@@ -78,21 +87,41 @@ def springs_of(loads: Loads, forms: Forms) -> Springs:
     return Springs(*_stacked(rows, 3, forms.d))
 
 
-def coupled_angles(forms: Forms) -> list[tuple[Any, ...]]:
-    """Return the angles in the rows of couplings, as rows of ``Torsions`` without stiffness."""
-    of, rows = forms.of, []
+class CoupledCoordinates(NamedTuple):
+    """Joint coordinates in the rows of couplings: rows of ``Torsions`` and ``Slides`` without stiffness."""
+
+    angles: list[tuple[Any, ...]]
+    displacements: list[tuple[Any, ...]]
+
+
+def coupled_coordinates(forms: Forms) -> CoupledCoordinates:
+    """Return the joint coordinates in the rows of couplings."""
+    of, found = forms.of, CoupledCoordinates([], [])
     table = of.model.data.primitives
-    for p, (row, factor) in of.angles.items():
+    for p, (row, law) in of.coordinates.items():
         first, second = int(table.first[p]), int(table.second[p])
-        across = (of.direction(first, w[p]) for w in (table.direction_first, table.turning_first))
-        directions = *across, of.direction(second, table.direction_second[p])
-        constant, form = forms([e for direction in directions for e in direction])
-        rows.append((constant, form, 0.0, 0.0, 0.0, -1, table.angle[p], row, factor))
-    return rows
+        if table.kind[p] == COUPLED_ANGLE:
+            across = (of.direction(first, w[p]) for w in (table.direction_first, table.turning_first))
+            directions = *across, of.direction(second, table.direction_second[p])
+            constant, form = forms([e for direction in directions for e in direction])
+            found.angles.append((constant, form, 0.0, 0.0, 0.0, -1, table.angle[p], row, *law))
+        else:
+            axis = of.direction(first, table.direction_first[p])
+            ends = of.point(first, table.point_first[p]), of.point(second, table.point_second[p])
+            found.displacements.append((*_along(forms, axis, ends), 0.0, 0.0, 0.0, -1, row, *law))
+    return found
+
+
+def _along(forms: Forms, axis: Any, ends: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Return constants (6,) and forms (6, d) of an axis and of the vector between two points."""
+    axis, one, other = forms(axis), forms(ends[0]), forms(ends[1])
+    constant, form = (np.concatenate([axis[c], other[c] - one[c]]) for c in range(2))
+    return constant, form
 
 
 def torsions_of(data: SceneData, forms: Forms, angles: Sequence[tuple[Any, ...]]) -> Torsions:
     """Return the loads about joints' axes, then the coupled angles."""
+    powers = data.primitives.higher.shape[-1] + 1
     of, rows, loads, turning = forms.of, [], data.loads, data.turning
     places = np.flatnonzero(loads.kind == ABOUT_AXIS)
     for k in places:
@@ -102,31 +131,33 @@ def torsions_of(data: SceneData, forms: Forms, angles: Sequence[tuple[Any, ...]]
         constant, form = forms([e for direction_vector in direction_vectors for e in direction_vector])
         stiffness, damping = (c[k] / of.length**2 for c in (loads.stiffness, loads.damping))
         indices = loads.function[k], s, -1
-        rows.append((constant, form, stiffness, damping, loads.natural[k], *indices, 0.0))
+        rows.append((constant, form, stiffness, damping, loads.natural[k], *indices, *[0.0] * powers))
     rows += angles
-    constant, form, stiffness, damping, natural, function, slot, row, factor = _stacked(rows, 9, forms.d, 7)
+    constant, form, stiffness, damping, natural, *others = _stacked(rows, 9, forms.d, 6 + powers)
     amount = loads.force[..., places, 0] / of.length**2
     amount = np.concatenate([amount, np.zeros((*amount.shape[:-1], len(angles)))], axis=-1)
-    function, slot, row = (number.astype(np.int64) for number in (function, slot, row))
-    return Torsions(constant, form, stiffness, damping, natural, amount, function, slot, row, factor)
+    function, slot, row = (number.astype(np.int64) for number in others[:3])
+    law = np.stack(others[3:], axis=-1)
+    return Torsions(constant, form, stiffness, damping, natural, amount, function, slot, row, law)
 
 
-def slides_of(loads: Loads, forms: Forms) -> Slides:
-    """Return the loads along joints' axes."""
-    of, rows, places = forms.of, [], np.flatnonzero(loads.kind == ALONG_AXIS)
+def slides_of(data: SceneData, forms: Forms, displacements: Sequence[tuple[Any, ...]]) -> Slides:
+    """Return the loads along joints' axes, then the coupled displacements."""
+    of, rows, loads = forms.of, [], data.loads
+    places, powers = np.flatnonzero(loads.kind == ALONG_AXIS), data.primitives.higher.shape[-1] + 1
     for k in places:
         first, second = int(loads.first[k]), int(loads.second[k])
-        axis = forms(of.direction(first, loads.axis[k]))
-        one, other = (
-            forms(of.point(first, loads.point_first[k])),
-            forms(of.point(second, loads.point_second[k])),
-        )
-        constant, form = (np.concatenate([axis[c], other[c] - one[c]]) for c in range(2))
-        natural = loads.natural[k] / of.length
-        rows.append((constant, form, loads.stiffness[k], loads.damping[k], natural, loads.function[k]))
-    constant, form, stiffness, damping, natural, function = _stacked(rows, 6, forms.d, 4)
+        axis = of.direction(first, loads.axis[k])
+        ends = of.point(first, loads.point_first[k]), of.point(second, loads.point_second[k])
+        numbers = loads.stiffness[k], loads.damping[k], loads.natural[k] / of.length
+        rows.append((*_along(forms, axis, ends), *numbers, loads.function[k], -1, *[0.0] * powers))
+    rows += displacements
+    constant, form, stiffness, damping, natural, *others = _stacked(rows, 6, forms.d, 5 + powers)
     amount = loads.force[..., places, 0] / of.length
-    return Slides(constant, form, stiffness, damping, natural, amount, function.astype(np.int64))
+    amount = np.concatenate([amount, np.zeros((*amount.shape[:-1], len(displacements)))], axis=-1)
+    function, row = (number.astype(np.int64) for number in others[:2])
+    law = np.stack(others[2:], axis=-1)
+    return Slides(constant, form, stiffness, damping, natural, amount, function, row, law)
 
 
 def timed_forces(loads: Loads, forms: Forms) -> TimedForces:

@@ -7,13 +7,10 @@ from typing import Any
 from numpy import cos, inf, sin, sqrt
 
 from mbref.equations.functions import expand_function
-from mbref.equations.primitives import unwrapped_angle
 from mbref.kernels.compilation import inlined, kernel
 
 VALUE, COSINE, SINE = range(3)  # functions of a driver's value
 SPRING_VECTOR, SPRING_LENGTH, SPRING_INVERSE, SPRING_RATE, SPRING_PULL, SPRING_SERIES = 0, 3, 4, 5, 6, 7
-E1, E2, F, COS, SIN, TORSION, TORQUE, TORQUE_COS, TORQUE_SIN, TORSION_SERIES = 0, 3, 6, *range(9, 16)
-SLIDE_AXIS, SLIDE_VECTOR, SLID, PUSH, SLIDE_SERIES = 0, 3, 6, 7, 8
 
 
 @inlined
@@ -36,7 +33,8 @@ def grow_forms(constant, form, k, variables, target):
 
 
 def varies(polynomials: Any) -> bool:
-    """Return whether a scene has loads other than constant forces and moments, or couplings of angles."""
+    """Return whether a scene has loads other than constant forces and moments, or couplings of angles or of
+    powers."""
     loads = polynomials.springs.damping.shape[0] + polynomials.torsions.damping.shape[0]
     return loads + polynomials.slides.damping.shape[0] + polynomials.timed.function.shape[0] > 0
 
@@ -138,111 +136,6 @@ def part_behind_no_length(memory):
         if springs.natural[s] > 0.0 and along < 0.0:
             largest = max(largest, sqrt(behind) / (sqrt(before) + sqrt(behind)))
     return largest
-
-
-@kernel
-def grow_torsions(k, memory):
-    """Compute order k of directions, cosine and sine; of the angle, whose rate is C S' - S C'."""
-    torsions, variables = memory.polynomials.torsions, memory.series.terms
-    for s in range(torsions.stiffness.shape[0]):
-        of = memory.series.torsions[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
-        grow_forms(torsions.constant[s], torsions.form[9 * s : 9 * s + 9], k, variables, of)
-        cosine, sine = 0.0, 0.0
-        for c in range(3):
-            cosine += product_order(of[E1 + c], of[F + c], k)
-            sine += product_order(of[E2 + c], of[F + c], k)
-        of[COS, k], of[SIN, k] = cosine, sine
-        if k == 0:
-            near = memory.run.equations.angles[torsions.slot[s]]
-            of[TORSION, 0] = unwrapped_angle(sine, cosine, near)
-        else:
-            value = 0.0
-            for i in range(1, k + 1):
-                value += i * (of[COS, k - i] * of[SIN, i] - of[SIN, k - i] * of[COS, i])
-            of[TORSION, k] = value / k
-
-
-@kernel
-def add_torsions(k, memory):
-    """Compute order k of the forces of loads about axes: (torque - stiffness (θ - natural) - damping θ') (C
-    δS - S δC)."""
-    torsions, sums, nz = memory.polynomials.torsions, memory.series.sums, memory.solver.pivot_columns.shape[0]
-    for s in range(torsions.stiffness.shape[0]):
-        of = memory.series.torsions[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
-        angle = of[TORSION, k] - torsions.natural[s] if k == 0 else of[TORSION, k]
-        of[TORQUE, k] = torsions.stiffness[s] * angle + torsions.damping[s] * (k + 1) * of[TORSION, k + 1]
-        of[TORQUE, k] -= applied_order(torsions.amount[s], torsions.function[s], k, memory.series.factors)
-        if torsions.row[s] >= 0:
-            of[TORQUE, k] = 0.0
-            add_coupled_angle(s, k, of, memory)
-        of[TORQUE_COS, k] = product_order(of[TORQUE], of[COS], k)
-        of[TORQUE_SIN, k] = product_order(of[TORQUE], of[SIN], k)
-        for c in range(3):
-            on_e2, on_e1 = (
-                product_order(of[TORQUE_COS], of[F + c], k),
-                product_order(of[TORQUE_SIN], of[F + c], k),
-            )
-            on_f = product_order(of[TORQUE_COS], of[E2 + c], k) - product_order(of[TORQUE_SIN], of[E1 + c], k)
-            e1, e2 = torsions.form[9 * s + E1 + c], torsions.form[9 * s + E2 + c]
-            f = torsions.form[9 * s + F + c]
-            for i in range(nz):
-                sums[k, i] += on_e2 * e2[i] - on_e1 * e1[i] + on_f * f[i]
-
-
-@kernel
-def add_coupled_angle(s, k, of, memory):
-    """Add to the row of a coupling the part of order k + 2 of an angle that does not contain that order of
-    the variables.
-
-    Also add order k - 1 of the multiplier, which is known, to the moment. The multiplier of order k acts by
-    the gradient at the time of expansion.
-    """
-    torsions, terms, sums = memory.polynomials.torsions, memory.series.terms, memory.series.sums
-    lane, factor = memory.solver.pivot_columns.shape[0] + torsions.row[s], torsions.factor[s]
-    if k > 0:
-        of[TORQUE, k - 1] = factor * terms[k + 1, lane]
-        of[TORQUE_COS, k - 1] = product_order(of[TORQUE], of[COS], k - 1)
-        of[TORQUE_SIN, k - 1] = product_order(of[TORQUE], of[SIN], k - 1)
-    order, cosine, sine = k + 2, 0.0, 0.0
-    for c in range(3):
-        for i in range(1, order):
-            cosine += of[E1 + c, i] * of[F + c, order - i]
-            sine += of[E2 + c, i] * of[F + c, order - i]
-    value = order * (of[COS, 0] * sine - of[SIN, 0] * cosine)
-    for i in range(1, order):
-        value += i * (of[COS, order - i] * of[SIN, i] - of[SIN, order - i] * of[COS, i])
-    sums[k, lane] += factor * value / order
-
-
-@kernel
-def grow_slides(k, memory):
-    """Compute order k of axes, of vectors between the anchors, and of displacements a · d."""
-    slides, variables = memory.polynomials.slides, memory.series.terms
-    for s in range(slides.stiffness.shape[0]):
-        of = memory.series.slides[SLIDE_SERIES * s : SLIDE_SERIES * (s + 1)]
-        grow_forms(slides.constant[s], slides.form[6 * s : 6 * s + 6], k, variables, of)
-        along = 0.0
-        for c in range(3):
-            along += product_order(of[SLIDE_AXIS + c], of[SLIDE_VECTOR + c], k)
-        of[SLID, k] = along
-
-
-@kernel
-def add_slides(k, memory):
-    """Compute order k of the forces of loads along axes: (force - stiffness (x - natural) - damping x') (a δd
-    + d δa)."""
-    slides, sums, nz = memory.polynomials.slides, memory.series.sums, memory.solver.pivot_columns.shape[0]
-    for s in range(slides.stiffness.shape[0]):
-        of = memory.series.slides[SLIDE_SERIES * s : SLIDE_SERIES * (s + 1)]
-        along = of[SLID, k] - slides.natural[s] if k == 0 else of[SLID, k]
-        of[PUSH, k] = slides.stiffness[s] * along + slides.damping[s] * (k + 1) * of[SLID, k + 1]
-        of[PUSH, k] -= applied_order(slides.amount[s], slides.function[s], k, memory.series.factors)
-        for c in range(3):
-            on_vector = product_order(of[PUSH], of[SLIDE_AXIS + c], k)
-            on_axis = product_order(of[PUSH], of[SLIDE_VECTOR + c], k)
-            axis, between = slides.form[6 * s + SLIDE_AXIS + c], slides.form[6 * s + SLIDE_VECTOR + c]
-            for i in range(nz):
-                sums[k, i] += on_vector * between[i] + on_axis * axis[i]
 
 
 @kernel

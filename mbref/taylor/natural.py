@@ -34,7 +34,7 @@ from mbref.taylor.expressions import (
     significant,
 )
 from mbref.taylor.loads import COSINE, SINE, VALUE
-from mbref.taylor.numbers import ManyScenes, OneScene, largest, scalar
+from mbref.taylor.numbers import ManyScenes, OneScene, largest, of_first, scalar
 from mbref.taylor.orientations import Orientations, Triple
 
 MOST_TERMS = 40  # largest number of terms of an equation that eliminates a position
@@ -64,8 +64,8 @@ class NaturalCoordinates:
     """The variables of a model from its pose at the start, lengths in the unit ``length`` (m), and rows.
 
     ``moving`` (n,) are the velocities that can be nonzero. ``kept`` are the remaining variables, ``given``
-    the variables that drivers prescribe, each as (driver, VALUE, COSINE or SINE).  ``angles`` belong to rows
-    of couplings, in addition to the products of the rows.  If drivers prescribe the whole motion
+    the variables that drivers prescribe, each as (driver, VALUE, COSINE or SINE).  ``coordinates`` belong to
+    rows of couplings, in addition to the products of the rows.  If drivers prescribe the whole motion
     (``driven``), no forces are needed: equations eliminate more variables, and driven cranks have linear
     rows.
     """
@@ -83,9 +83,8 @@ class NaturalCoordinates:
         self._positions = range(3 * self.nb)
         self.eliminate = Elimination(self._may_go)
         self.orientations = Orientations(model, axes, self._moving[:, 3:], self.direction_vectors)
-        self.angles: dict[
-            int, tuple[int, float]
-        ] = {}  # primitive of an angle → its row, and its factor in this row
+        # primitive of a joint coordinate → its row, and the factors of its powers in this row
+        self.coordinates: dict[int, tuple[int, list[float]]] = {}
         self.rows = self._rows()
         gone = self.eliminate.expressed
         kept = (v for v in range(len(self.direction_vectors)) if v not in gone and v not in self.given)
@@ -132,7 +131,7 @@ class NaturalCoordinates:
                 is_driven = self.model.data.primitives.driver[p] >= 0
                 rows += self._driven(p) if is_driven else [self._undriven(p)]
         couplings = self._couplings()
-        rows += [row for row, angles in couplings if not angles]
+        rows += [row for row, coordinates in couplings if not coordinates]
         free = (o for number, o in self.orientations.numbered.items() if number not in turned)
         rows = [row for orientation in free for row in orientation.rows()] + rows
         before: int | None = None
@@ -144,16 +143,17 @@ class NaturalCoordinates:
             self.eliminate.settle()
         linear = ({(ONE, v): c for v, c in equation.items()} for equation in self.eliminate.left)
         found = independent([row for row in (*rows, *linear) if degree(row) > 0])
-        for row, angles in couplings:
-            if angles:
-                self.angles |= {p: (len(found), factor) for p, factor in angles}
+        for row, coordinates in couplings:
+            if coordinates:
+                self.coordinates |= {p: (len(found), law) for p, law in coordinates}
                 found.append(self._reduced(row))
         return found
 
-    def _couplings(self) -> list[tuple[Polynomial, list[tuple[int, float]]]]:
-        """Return for each coupling the polynomial of its displacements, and its angles with their factors.
+    def _couplings(self) -> list[tuple[Polynomial, list[tuple[int, list[float]]]]]:
+        """Return for each coupling the polynomial of its displacements in first power, and all other
+        coordinates with the factors of their powers.
 
-        In the unit of length the larger factor is 1.
+        In the unit of length the largest factor of a coordinate is 1.
         """
         primitives, found = self.model.data.primitives, []
         coupled = np.flatnonzero(np.isin(primitives.kind, (COUPLED_ANGLE, COUPLED_SLIDE)))
@@ -162,10 +162,13 @@ class NaturalCoordinates:
             row, polynomial = ends.tolist(), Polynomial()
             factors = [scalar(primitives.length[p]) * self._unit(p) for p in row]
             size = largest(factors)
-            angles = []
+            coordinates = []
             for p, factor in zip(row, factors, strict=True):
-                if primitives.kind[p] == COUPLED_ANGLE:
-                    angles.append((p, factor / size))
+                law = [factor / size]
+                for k, higher in enumerate(primitives.higher[p], 2):
+                    law.append(scalar(higher) * self._unit(p) ** k / size)
+                if primitives.kind[p] == COUPLED_ANGLE or any(map(of_first, law[1:])):
+                    coordinates.append((p, law))
                 else:
                     axis = self.direction(int(primitives.first[p]), primitives.direction_first[p])
                     apart = _difference(*self._ends(p)[::-1])
@@ -173,7 +176,7 @@ class NaturalCoordinates:
                     polynomial = {
                         k: polynomial.get(k, 0.0) + moved.get(k, 0.0) for k in {**polynomial, **moved}
                     }
-            found.append((polynomial, angles))
+            found.append((polynomial, coordinates))
         return found
 
     def _unit(self, p: int) -> float:

@@ -6,7 +6,7 @@ from numpy import inf
 
 from mbref.kernels.compilation import inlined, kernel
 from mbref.linear_algebra.vectors import copy
-from mbref.taylor.angles import add_angle_gradients
+from mbref.taylor.coupled_coordinates import add_gradients, has_coordinates
 from mbref.taylor.simd import WIDTH, load, store
 
 
@@ -42,8 +42,8 @@ def put_rows(memory):
         store(load(linear, j), tableau, j)
     for e in range(place.shape[0]):
         tableau[place[e]] += weight[e] * terms[0, other[e]]
-    if memory.polynomials.torsions.row.shape[0] > 0:
-        add_angle_gradients(terms, solver.tableau, memory)
+    if has_coordinates(memory.polynomials):
+        add_gradients(terms, solver.tableau, memory)
 
 
 @kernel

@@ -100,7 +100,7 @@ class Torsions(NamedTuple):
     function: Annotated[Indices, "torsions"]  # function of time that multiplies the torque; -1 without
     slot: Annotated[Indices, "torsions"]  # index of the unwrapped angle among the model's angles
     row: Annotated[Indices, "torsions"]  # row of the coupling to which the angle belongs; -1 for a load
-    factor: Annotated[Vector, "torsions"]  # factor of the angle in the row of its coupling
+    law: Annotated[Matrix, "torsions", "powers + 1"]  # factors of powers of the angle in the row
 
 
 class Slides(NamedTuple):
@@ -113,6 +113,8 @@ class Slides(NamedTuple):
     natural: Annotated[Vector, "slides"]
     amount: Annotated[Vector, "slides"]  # of a force
     function: Annotated[Indices, "slides"]  # function of time that multiplies the force; -1 without
+    row: Annotated[Indices, "slides"]  # row of the coupling to which the displacement belongs; -1 for a load
+    law: Annotated[Matrix, "slides", "powers + 1"]  # factors of powers of the displacement in the row
 
 
 class TimedForces(NamedTuple):

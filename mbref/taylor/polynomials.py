@@ -14,7 +14,7 @@ from mbref.taylor.expressions import ONE, cleaned
 from mbref.taylor.forms import Forms
 from mbref.taylor.load_polynomials import (
     constant_forces,
-    coupled_angles,
+    coupled_coordinates,
     is_constant,
     slides_of,
     springs_of,
@@ -43,7 +43,7 @@ class Geometry:
         self._rows, self._products = _rows(of, lane, self._lanes), _products(of, lane, self._lanes)
         self._poses, self._given = _poses(of, self._forms), _given(of)
         self.tableau = _tableau(self._rows, len(of.kept), len(of.rows), self._lanes)
-        self._angles = coupled_angles(self._forms)
+        self._coupled = coupled_coordinates(self._forms)
         self._no_loads: dict[str, Any] | None = None  # tables of scenes whose loads are all constant
 
     def polynomials(self, model: Model) -> Polynomials:
@@ -65,8 +65,8 @@ class Geometry:
             return self._no_loads
         found = {
             "springs": springs_of(loads, self._forms),
-            "torsions": torsions_of(data, self._forms, self._angles),
-            "slides": slides_of(loads, self._forms),
+            "torsions": torsions_of(data, self._forms, self._coupled.angles),
+            "slides": slides_of(data, self._forms, self._coupled.displacements),
             "timed": timed_forces(loads, self._forms),
         }
         self._no_loads = found if are_constant else self._no_loads

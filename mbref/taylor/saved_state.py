@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mbref.kernels.compilation import kernel
 from mbref.linear_algebra.vectors import copy
-from mbref.taylor.loads import TORSION, TORSION_SERIES
+from mbref.taylor.joint_loads import TORSION, TORSION_SERIES
 from mbref.taylor.simd import WIDTH, load, store
 
 

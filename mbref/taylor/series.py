@@ -12,17 +12,9 @@ from mbref.kernels.compilation import exchangeable, inlined, kernel
 from mbref.kernels.layout import OK
 from mbref.taylor.coefficients import largest_coefficient
 from mbref.taylor.generated_calls import expand_by_code, expand_by_power
+from mbref.taylor.joint_loads import add_slides, add_torsions, grow_slides, grow_torsions
 from mbref.taylor.layout import TERMS
-from mbref.taylor.loads import (
-    add_slides,
-    add_springs,
-    add_timed_forces,
-    add_torsions,
-    grow_slides,
-    grow_springs,
-    grow_torsions,
-    has_varying_loads,
-)
+from mbref.taylor.loads import add_springs, add_timed_forces, grow_springs, has_varying_loads
 from mbref.taylor.simd import WIDTH, gather, load, store
 from mbref.taylor.solver import solution
 

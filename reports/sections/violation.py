@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from crosscheck.judge.metrics import violation_series
+from crosscheck.judge.violations import violation_series
 
 from .. import time_series
 from ..blocks import Block, Figure, Heading, Text

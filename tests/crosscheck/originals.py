@@ -55,6 +55,17 @@ def own_motion(model, found: Source, times, key: int = -1) -> np.ndarray:
     return np.array(places)
 
 
+def _of_polynomials(model, data) -> np.ndarray:
+    """P''(q) q̇² (nefc,) of equalities of two joints, which MuJoCo's reference accelerations leave out."""
+    found = np.zeros(data.nefc)
+    for e in np.flatnonzero((model.eq_type == mujoco.mjtEq.mjEQ_JOINT) & (model.eq_obj2id >= 0)):
+        place, rate = (at[model.eq_obj2id[e]] for at in (model.jnt_qposadr, model.jnt_dofadr))
+        moved = data.qpos[place] - model.qpos0[place]
+        bend = np.polynomial.Polynomial(model.eq_data[e, :5]).deriv(2)(moved) * data.qvel[rate] ** 2
+        found[(data.efc_id[: data.nefc] == e) & (data.efc_type[: data.nefc] == 0)] = bend
+    return found
+
+
 def _accelerations(model, data) -> np.ndarray:
     """q̈ (nv,) with M q̈ + c = τ + Jᵀλ and J q̈ = -J̇ q̇; coordinates that no inertia resists stay."""
     mass = np.zeros((model.nv, model.nv))
@@ -66,7 +77,7 @@ def _accelerations(model, data) -> np.ndarray:
     root = np.linalg.cholesky(mass)
     free = np.linalg.solve(mass, data.qfrc_passive + data.qfrc_actuator - data.qfrc_bias)
     weighted = np.linalg.solve(root, rows.T).T
-    missing = data.efc_aref[: data.nefc][held] - rows @ free
+    missing = (data.efc_aref[: data.nefc] + _of_polynomials(model, data))[held] - rows @ free
     return free + np.linalg.solve(root.T, np.linalg.pinv(weighted, rcond=RANK) @ missing)
 
 

@@ -100,12 +100,6 @@ def test_drakes_own_stepping_keeps_couplings_and_armatures():
     assert found["error"] < 1e-3 and found["violation_position"] < 1e-3, found
 
 
-def test_bullet_refuses_an_armature_by_its_joint():
-    pytest.importorskip("pybullet")
-    refusal = engine("bullet").cannot(pendulum())
-    assert refusal.owner is Owner.ENGINE and "joint 'A' has an armature" in refusal.reason
-
-
 @pytest.mark.parametrize("make", [make for make in EVERY if not needs_what_is_missing("bullet", make)])
 def test_bullet_moves_coupled_joints_to_first_order(make):
     """Half the step gives half the error against the judge's truth, within 5 %, and joints stay closed."""

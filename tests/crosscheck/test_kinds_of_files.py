@@ -42,7 +42,6 @@ REFUSED = {
     "friction.urdf": "dry friction of 'A'.*--without friction",
     "frictionloss.xml": "dry friction of 'B'.*--without friction",
     "gravcomp.xml": "compensation of the weight of b.*--without gravity-compensation",
-    "joint_coupled_quadratically.xml": "equality 'e' of type joint, whose polynomial is not linear",
     "mimic_of_a_fixed_joint.urdf": "joint 'C' mimics 'A': the file has no such joint that moves",
     "missing_mesh_inertia.xml": "body 'link2': its inertia follows from the shape 'link2', whose file",
     "motor_of_tendon.xml": "actuator 's', which acts on no single hinge or slide.*--without motors",

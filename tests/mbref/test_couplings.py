@@ -7,6 +7,8 @@ from mbref.scene import JOINT_TYPES, SceneError
 from tests.helpers import coupled_mechanisms
 from tests.helpers.coupled_mechanisms import gear_pair, pendulum
 
+BENT = {"ratio": None}
+NO_END = "must not end with 0, which has no influence"
 NO_SLIDE = "is revolute, which has no displacement to be coupled"
 
 
@@ -43,6 +45,12 @@ def test_coupling_takes_the_angle_of_a_joint_that_has_one_and_otherwise_the_disp
         ({"coordinates": ["angle", "displacement"]}, f"coupling[teeth].joints: 'B' {NO_SLIDE}"),
         ({"name": "A"}, "coupling[A].name: 'A' is already the name of a joint"),
         ({"joints": ["A"]}, "coupling[teeth].joints: must be two or more names of joints, got ['A']"),
+        ({"polynomial": [1.0, 2.0]}, "coupling[teeth].polynomial: or ratio, not both"),
+        (
+            {**BENT, "polynomial": [1.0, 0.0]},
+            f"coupling[teeth].polynomial: {NO_END}",
+        ),
+        ({**BENT, "polynomial": [1.0, "2 m"]}, "coupling[teeth].polynomial[1]: is in rad/rad^2, got '2 m'"),
         ({"ratoi": 1.0}, "coupling[teeth].ratoi: is not a known field; did you mean 'ratio'?"),
     ],
 )

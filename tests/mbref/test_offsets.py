@@ -71,23 +71,6 @@ def test_coupled_coordinates_start_by_the_least_displacement_and_move_from_there
 
 
 @every
-def test_coordinates_obey_the_offset_up_to_full_turns(make, name, offset):
-    """second = offset + ratio · first at all samples, where 2πk with one whole |k| ≤ 3 may be added to an
-    angle."""
-    scene = shifted(make, name, offset)
-    motion = mbref.simulate(scene, times=[0.0, 0.1, 0.2])
-    (coupling,) = (c for c in scene.coupling if c.name == name)
-    (first, one), (second, other) = scene.coupled(coupling)
-    q = [getattr(motion.joint(joint.name), kind) for joint, kind in ((first, one), (second, other))]
-    off = q[1] - offset - coupling.ratio * q[0]
-    turns = 2 * np.pi * np.arange(-3, 4)
-    ends = (turns if kind == "angle" else np.zeros(1) for kind in (one, other))
-    first_turns, second_turns = ends
-    remainders = off + (second_turns[:, None] - coupling.ratio * first_turns)[..., None]
-    assert np.abs(remainders).max(axis=2).min() < CLOSED_FORM
-
-
-@every
 def test_assembled_scene_has_no_offset_and_moves_as_the_scene_with_offset(make, name, offset):
     """It satisfies the joints, has the counts of the scene without offset, and is its own assembly. A run of
     the scene with offset begins at this pose, so that both motions are equal to the bit."""

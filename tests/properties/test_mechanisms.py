@@ -12,9 +12,9 @@ from crosscheck.judge.constraints import initial_poses, jacobian, scene_length
 from crosscheck.judge.energy import energy_series
 from crosscheck.judge.gauss_motion import accelerations, gauss_motion
 from crosscheck.judge.gauss_principle import goes_on, singular_values
-from crosscheck.judge.metrics import violation_series
 from crosscheck.judge.reaction_balance import balance, idle
 from crosscheck.judge.tolerances import RANK
+from crosscheck.judge.violations import violation_series
 from mbref import Limits, rotations, simulate
 from mbref.design.diagnosis import diagnose
 from mbref.motions.trajectory import Outcome, Trajectory

@@ -72,6 +72,9 @@ def in_other_units(scene: Scene, length: float, time: float) -> Scene:
 def _coupled_in_lengths(scene: Scene, coupling: Coupling, length: float) -> Coupling:
     """Return a coupling whose displacements are multiplied by a length."""
     *_, last = sizes = [length if kind == DISPLACEMENT else 1.0 for _, kind in scene.coupled(coupling)]
+    if coupling.polynomial is not None:
+        law = tuple(last / sizes[0] ** k * each for k, each in enumerate(coupling.polynomial, 1))
+        return mapped(coupling, {"polynomial": lambda _: law, "offset": times(last)})
     if coupling.ratios is None:
         return mapped(coupling, {"ratio": times(last / sizes[0]), "offset": times(last)})
     ratios = tuple(last / size * ratio for size, ratio in zip(sizes, coupling.ratios, strict=True))

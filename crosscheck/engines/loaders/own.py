@@ -170,7 +170,7 @@ class Imported(Loaded):
             *more, leader, follower = coupling.joints
             *factors, of_leader, of_follower = coupling.factors
             if leader != follower:  # the thread of a screw couples two coordinates of one joint
-                law = coefficients(coupling.offset, -of_leader / of_follower)
+                law = coefficients(coupling.offset, *(coupling.polynomial or [-of_leader / of_follower]))
                 others = zip(more, (-factor / of_follower for factor in factors), strict=True)
                 yield Coupling(coupling.name, follower, leader, law, tuple(others))
 

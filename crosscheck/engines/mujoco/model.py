@@ -44,7 +44,10 @@ from mbref.scene import (
     Spring,
 )
 
-SUPPORTS = replace(EVERYTHING, joints=tuple(JOINT_TYPES), over_time=(TABLE, FACTOR), massless_links=True)
+POWERS = 4  # of the polynomial in MuJoCo's equality of two joints
+SUPPORTS = replace(
+    EVERYTHING, joints=tuple(JOINT_TYPES), over_time=(TABLE, FACTOR), massless_links=True, powers=POWERS
+)
 COUPLING = "coupling "  # prefix of the names of equalities that are couplings
 SWITCHED = "switched "  # prefix of the names of equalities that are joints with intervals, and of their sites
 UNIT = (1.0, 0.0, 0.0, 0.0)
@@ -215,11 +218,12 @@ class _Builder:
         equality.data[:5] = 0.0
 
     def add_coupling(self, coupling: Coupling) -> Any:
-        """Add the equality q₂ = ratio · q₁, as MuJoCo's polynomial of degree 1."""
+        """Add the equality of two joints, as MuJoCo's polynomial of degree 4."""
         first, second = (self.joint[i].name for i in self.tree.coupled(self.scene, coupling))
         kind, objects = self.mujoco.mjtEq.mjEQ_JOINT, self.mujoco.mjtObj.mjOBJ_JOINT
         equality = self._equality(kind, objects, COUPLING + coupling.name, second, first)
-        equality.data[:5] = 0.0, coupling.gear_ratio, 0.0, 0.0, 0.0
+        law = coupling.polynomial or (coupling.gear_ratio,)
+        equality.data[: POWERS + 1] = 0.0, *law, *[0.0] * (POWERS - len(law))
         return equality
 
     def _equality(self, kind: Any, objects: Any, name: str, first: str, second: str) -> Any:

@@ -22,7 +22,7 @@ from crosscheck.engines.shared.own_steps import STEP, SteppingEngine, Steps
 from crosscheck.engines.shared.tree_reactions import LinkMotion
 from mbref.scene import Scene
 
-SUPPORTS = replace(OF_MUJOCO, over_time=(), massless_links=False)
+SUPPORTS = replace(OF_MUJOCO, over_time=(), massless_links=False, powers=1)
 MOST_DENSE = 60  # degrees of freedom, for more MuJoCo Warp has no dense Jacobian
 STOCK, BY_C = "stock", "C"
 FAMILIES = {

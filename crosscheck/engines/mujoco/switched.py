@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from crosscheck.engine import Setting
-from crosscheck.engines.mujoco.model import COUPLING, SWITCHED
+from crosscheck.engines.mujoco.model import COUPLING, POWERS, SWITCHED
 from crosscheck.engines.mujoco.simulation import Simulation
 from crosscheck.engines.shared.driver_motion import motion
 from crosscheck.engines.shared.sampling import Sample
@@ -54,7 +54,8 @@ class EqualityRun(SwitchedRun):
                 data.qpos[model.jnt_qposadr[j]] - model.qpos0[model.jnt_qposadr[j]]
                 for j in (model.eq_obj1id[equality], model.eq_obj2id[equality])
             )
-            model.eq_data[equality, 0] = second - part.gear_ratio * first
+            model.eq_data[equality, 0] = 0.0
+            model.eq_data[equality, 0] = second - np.polyval(model.eq_data[equality, POWERS::-1], first)
             return
         one, other = (model.site(f"{SWITCHED}{part.name}.{i}").id for i in (0, 1))
         body = model.site_bodyid[other]

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.mujoco.model import COUPLING, description
+from crosscheck.engines.mujoco.model import COUPLING, POWERS, description
 from crosscheck.engines.shared.spanning_tree import Link, Tree, spanning_tree
 from crosscheck.refusals import MOST_COUPLED
 from mbref import rotations
@@ -24,14 +24,14 @@ KEYFRAME = "loads"  # with the control values of motors that stand for forces an
 
 
 def write(scene: Scene) -> Exported:
-    """Return the MJCF text; drivers, constant loads and couplings of more than two joints are reported as
-    left out.  SceneError without masses."""
+    """Return the MJCF text; drivers, constant loads, and couplings of more than two joints or of high powers
+    are reported as left out.  SceneError without masses."""
     if not scene.has_mass():
         raise SceneError([f"{scene.name}: MJCF needs the mass and inertia of every body"])
     if links := [body.name for body in scene.body if body.mass == 0]:
         raise SceneError([f"body {links[0]!r}: is a massless link; MuJoCo reads no moving body of mass 0"])
     kept = [load for load in scene.load if not (isinstance(load, CONSTANT) or load.over_time)]
-    pairs = [coupling for coupling in scene.coupling if len(coupling.joints) == MOST_COUPLED]
+    pairs = [each for each in scene.coupling if len(each.joints) == MOST_COUPLED and each.powers <= POWERS]
     bare = scene.with_(driver=(), load=kept, coupling=pairs)
     tree = spanning_tree(bare)
     spec, pushed = description(bare, tree)
@@ -167,6 +167,8 @@ def _left_out(scene: Scene) -> Iterator[str]:
         if len(coupling.joints) > MOST_COUPLED:
             count = len(coupling.joints)
             yield f"coupling {coupling.name}: an equality of MJCF relates two joints, not {count}"
+        elif coupling.powers > POWERS:
+            yield f"coupling {coupling.name}: an equality of MJCF has degree {POWERS}, not {coupling.powers}"
     for driver in scene.driver:
         yield f"driver of {driver.joint}: MJCF prescribes no motion over time"
     for i, load in enumerate(scene.load):

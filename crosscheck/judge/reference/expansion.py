@@ -43,7 +43,7 @@ class Expansion:
         self._held, self._drives = held, held.drives(t, terms)
         self._loads: LoadSeries = loads.series(t, angles, terms)
         self._gears = GearSeries(of.joints, held.gears, turned, terms, zeros)
-        rows = held.all_gradients(start[0], self._drives)
+        rows = held.all_gradients(start[0], self._drives, turned)
         self._system = SaddlePoint(of.mass, rows, held.compliance(zeros), of.arithmetic)
         self.x = zeros(terms, 3, start[0].shape[1])
         self._u, self._w = zeros(2, terms, 3, p)

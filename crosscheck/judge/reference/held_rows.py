@@ -7,7 +7,7 @@ Redundant rows are left out by a QR factorisation of Gᵀ with column pivoting.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -61,10 +61,11 @@ class HeldRows:
         products = self.w(x).T[:, :, None] * u[:, None, :] + self.u(x).T[:, :, None] * w[:, None, :]
         return drives.combined(products[None], 0)
 
-    def all_gradients(self, x: np.ndarray, drives: Drives) -> np.ndarray:
-        """Return G (m + g, 3, n - 4) of the rows and of the gears."""
+    def all_gradients(self, x: np.ndarray, drives: Drives, turned: Sequence[Any]) -> np.ndarray:
+        """Return G (m + g, 3, n - 4) of the rows and of the gears, whose coordinates are nearest to
+        ``turned``."""
         own = self.gradient(x, drives)[:, :, :-4]
-        return np.concatenate([own, self._joints.gradients(self.gears, x)]) if self.gears else own
+        return np.concatenate([own, self._joints.gradients(self.gears, x, turned)]) if self.gears else own
 
     def compliance(self, zeros: Any) -> np.ndarray:
         """Return reciprocal inertias (m + g,) of armatures, zeros for all other rows."""
@@ -74,12 +75,12 @@ class HeldRows:
                 found[k] = 1 / gear.inertia
         return np.asarray(found)
 
-    def unit_gradient(self, x: np.ndarray, t: Any) -> np.ndarray:
+    def unit_gradient(self, x: np.ndarray, t: Any, turned: Sequence[Any]) -> np.ndarray:
         """Return G (count, 3 (n - 4)) in double precision with rows of unit length, without the ground's
-        columns."""
+        columns; coordinates of couplings are nearest to ``turned``."""
         rows = doubles(self.gradient(x, self.drives(t, 1)))[:, :, :-4].reshape(len(self.numbers), -1)
         if self.couplings:
-            coupled = doubles(self._joints.gradients(self.couplings, x))
+            coupled = doubles(self._joints.gradients(self.couplings, x, turned))
             rows = np.concatenate([rows, coupled.reshape(len(coupled), -1)])
         return rows / np.linalg.norm(rows, axis=1, keepdims=True)
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.judge.coupling_laws import law_value
 from mbref.scene import Joint
 from mbref.scene.joints import ANGLE
 
@@ -152,20 +153,31 @@ Form = AngleForm | SlideForm
 
 @dataclass(frozen=True)
 class Gear:
-    """The row Σ weight × coordinate, with coordinates given by number.
+    """The row Σ law(q), with coordinates q given by number; a law has the factors of q, q², ….
 
     For a coupling the sum is 0. For an armature the second derivative of the sum is the multiplier over the
     ``inertia``.
     """
 
-    terms: tuple[tuple[int, Any], ...]
+    terms: tuple[tuple[int, tuple[Any, ...]], ...]
     inertia: Any = None
 
+    @property
+    def bends(self) -> bool:
+        """True if a law has a power above the first."""
+        return any(len(law) > 1 for _, law in self.terms)
+
     def total(self, values: Sequence[Any]) -> Any:
-        """Return Σ weight × value, with one value for each coordinate."""
-        return sum(
-            (weight * values[i] for i, weight in self.terms[1:]), self.terms[0][1] * values[self.terms[0][0]]
-        )
+        """Return Σ law(q), with one value for each coordinate."""
+        found = [law_value(law, values[i]) for i, law in self.terms]
+        return sum(found[1:], found[0])
+
+    def rate(self, rates: Sequence[Any], values: Sequence[Any]) -> Any:
+        """Return Σ law'(q) × rate, with rates or gradients, and values q, of the coordinates; a linear row
+        needs no values."""
+        slopes = [law[0] if len(law) == 1 else law_value(law, values[i], 1) for i, law in self.terms]
+        found = [slope * rates[i] for slope, (i, _) in zip(slopes, self.terms, strict=True)]
+        return sum(found[1:], found[0])
 
 
 class JointCoordinates:
@@ -181,12 +193,13 @@ class JointCoordinates:
         self.armatures = [self._armature(joint) for joint in geared]
 
     def _coupling(self, coupling: Any) -> Gear:
-        ends = zip(self._of.scene.coupled(coupling), coupling.factors, strict=True)
-        pairs = [(self._number(*end), factor) for end, factor in ends]
+        ends = zip(self._of.scene.coupled(coupling), coupling.laws, strict=True)
+        pairs = [(self._number(*end), law) for end, law in ends]
         units = [1.0 if self.forms[i].turns else self._of.length for i, _ in pairs]
-        largest = max(abs(ratio) * unit for (_, ratio), unit in zip(pairs, units, strict=True))
-        number = self._of.arithmetic.number
-        terms = [(i, number(ratio) * unit / largest) for (i, ratio), unit in zip(pairs, units, strict=True)]
+        largest = max(abs(law[0]) * unit for (_, law), unit in zip(pairs, units, strict=True))
+        number, terms = self._of.arithmetic.number, []
+        for (i, law), unit in zip(pairs, units, strict=True):
+            terms.append((i, tuple(number(c) * unit**k / largest for k, c in enumerate(law, 1))))
         return Gear(tuple(terms))
 
     def _armature(self, joint: Joint) -> Gear:
@@ -194,7 +207,7 @@ class JointCoordinates:
         inertia = self._of.arithmetic.number(joint.reflected_inertia)
         if self.forms[i].turns:
             inertia = inertia / self._of.length**2
-        return Gear(((i, self._of.arithmetic.number(1.0)),), inertia)
+        return Gear(((i, (self._of.arithmetic.number(1.0),)),), inertia)
 
     def _number(self, joint: Joint, coordinate: str) -> int:
         """Return the number of a coordinate; a new coordinate is appended."""
@@ -223,24 +236,26 @@ class JointCoordinates:
         rounding only."""
         if not couplings:
             return (self._of.arithmetic.zeros(0),) * 2
-        levels = self.values(x, near), self.rates(x, v)
-        first, second = (np.array([gear.total(level) for gear in couplings]) for level in levels)
-        return first, second
+        values, rates = self.values(x, near), self.rates(x, v)
+        first = np.array([gear.total(values) for gear in couplings])
+        return first, np.array([gear.rate(rates, values) for gear in couplings])
 
     def mass(self, x: np.ndarray) -> np.ndarray:
         """Return the armatures' part (3 (n - 4), 3 (n - 4)) of the mass matrix at coordinates x (3, n)."""
         size = 3 * (x.shape[1] - 4)
         total = self._of.arithmetic.zeros(size, size)
-        for gear, gradient in zip(self.armatures, self.gradients(self.armatures, x), strict=True):
+        for gear, gradient in zip(self.armatures, self.gradients(self.armatures, x, ()), strict=True):
             total = total + gear.inertia * (gradient.ravel()[:, None] * gradient.ravel())
         return np.asarray(total)
 
-    def gradients(self, gears: Sequence[Gear], x: np.ndarray) -> np.ndarray:
-        """Return derivatives (g, 3, n - 4) of the rows of gears by coordinates x (3, n)."""
+    def gradients(self, gears: Sequence[Gear], x: np.ndarray, near: Sequence[Any]) -> np.ndarray:
+        """Return derivatives (g, 3, n - 4) of the rows of gears by coordinates x (3, n); angles are nearest
+        to ``near``."""
         if not gears:
             return self._of.arithmetic.zeros(0, 3, x.shape[1] - 4)
         found = [form.gradient(x)[:, :-4] for form in self.forms]
-        return np.array([gear.total(found) for gear in gears])
+        values = self.values(x, near) if any(gear.bends for gear in gears) else ()
+        return np.array([gear.rate(found, values) for gear in gears])
 
 
 class GearSeries:
@@ -252,6 +267,8 @@ class GearSeries:
         self.gears = gears
         self.coordinates = [form.series(value, terms) for form, value in zip(of.forms, start, strict=True)]
         self._moments, self._nothing = zeros(len(of.forms), terms), zeros(len(gears))
+        self._multipliers = zeros(len(gears), terms)
+        self._slopes: dict[tuple[int, int], np.ndarray] = {}  # series of law'(q), by gear and coordinate
 
     def grow(self, k: int, x: np.ndarray) -> None:
         """Add order k of the coordinates X (terms, 3, n)."""
@@ -262,17 +279,41 @@ class GearSeries:
         """Return order k (g,) of the rows."""
         found = self._nothing.copy()
         for g, gear in enumerate(self.gears):
-            found[g] = gear.total([coordinate.value[k] for coordinate in self.coordinates])
+            for i, law in gear.terms:
+                found[g] = found[g] + _composed(law, self.coordinates[i].value, k)
         return np.asarray(found)
 
     def pull(self, k: int) -> Any:
         """Return order k (3, n) of the gradients times the multipliers; 0 without gears."""
+        self._act(k)
         pairs = zip(self.coordinates, self._moments, strict=True)
         return sum((coordinate.pull(moment, k) for coordinate, moment in pairs), 0)
 
     def put(self, multipliers: np.ndarray, k: int) -> None:
         """Add order k of the multipliers (g,)."""
-        for value, gear in zip(multipliers, self.gears, strict=True):
-            for i, weight in gear.terms:
-                self._moments[i, k] = self._moments[i, k] + weight * value
+        self._multipliers[:, k] = multipliers
         self.pull(k)
+
+    def _act(self, k: int) -> None:
+        """Compute order k of the moments, law'(q) times the multiplier, from known orders of multipliers."""
+        self._moments[:, k] = self._moments[:, k] * 0
+        for g, (known, gear) in enumerate(zip(self._multipliers, self.gears, strict=True)):
+            for i, law in gear.terms:
+                if len(law) == 1:
+                    self._moments[i, k] = self._moments[i, k] + law[0] * known[k]
+                    continue
+                slopes = self._slopes.setdefault((g, i), 0 * self.coordinates[i].value)
+                rest = [power * factor for power, factor in enumerate(law[1:], 2)]
+                slopes[k] = law[0] * (k == 0) + _composed(rest, self.coordinates[i].value, k)
+                self._moments[i, k] = self._moments[i, k] + convolved(slopes, known, k)
+
+
+def _composed(law: Sequence[Any], q: np.ndarray, k: int) -> Any:
+    """Return order k of law[0] q + law[1] q² + … of a series q (terms,)."""
+    if len(law) < 2:
+        return law[0] * q[k] if law else 0
+    total = 0 * q[: k + 1]
+    for factor in law[::-1]:
+        total[0] = total[0] + factor
+        total = np.array([convolved(total, q, n) for n in range(k + 1)])
+    return total[k]

@@ -15,10 +15,11 @@ import numpy as np
 
 from crosscheck.judge.arithmetic import Arithmetic, doubles
 from crosscheck.judge.constraints import joint_coordinates
-from crosscheck.judge.impacts import impact
-from crosscheck.judge.pieces import State, at_start, events, has_pieces, later
+from crosscheck.judge.pieces import State, at_start, events, followed, has_pieces, later
+from crosscheck.judge.reference.bounces import Bounces
 from crosscheck.judge.reference.motion import Motion, Times
-from mbref.scene import JointLoad, Scene, SceneError
+from crosscheck.judge.stops import held
+from mbref.scene import Scene, SceneError
 
 Formulation = Callable[..., Motion]
 BETWEEN = 64  # samples of a piece between which turns of joints with loads are counted
@@ -33,19 +34,32 @@ def motion_by(
     if not has_pieces(scene):
         return formulation(scene, times, arithmetic, **options)
     end, wanted, left = options.pop("seconds", np.inf), np.asarray(times, dtype=float), 0.0
-    piece, begin, moved, parts = at_start(scene), 0.0, _unmoved(scene), list[Motion]()
-    for stop in (*events(scene, float(wanted[-1])), None):
-        chosen = wanted[(wanted >= begin) & (wanted < (np.inf if stop is None else stop))]
-        own = np.unique([*chosen, *([] if stop is None else np.linspace(begin, stop, BETWEEN))]) - begin
+
+    def run(piece: Scene, times: np.ndarray) -> Motion:
+        nonlocal left
         began = time.thread_time()
-        found = formulation(piece, own, arithmetic, seconds=end - left, **options)
+        found = formulation(piece, times, arithmetic, seconds=end - left, **options)
         left += time.thread_time() - began
+        return found
+
+    bounces = Bounces(scene, run, float(wanted[-1]))
+    piece, begin, moved, parts = at_start(scene), 0.0, _unmoved(scene), list[Motion]()
+    contacts: tuple[str, ...] = ()
+    if bounces.ends:
+        piece, contacts = _after(scene, piece, 0.0, run(piece, np.zeros(1)), moved, (), bounces)
+    while True:
+        stop = next((t for t in events(scene, float(wanted[-1])) if t > begin), None)
+        met = bounces.next(piece, contacts, moved, (float(wanted[-1]) if stop is None else stop) - begin)
+        stop = stop if met is None else begin + met
+        chosen = wanted[(wanted >= begin) & (wanted < (np.inf if stop is None else stop))]
+        own = np.unique([*(chosen - begin), *([] if stop is None else np.linspace(0, stop - begin, BETWEEN))])
+        found = run(held(piece, contacts), own)
         parts.append(_later(found, begin, chosen))
         if stop is None or found.reason:
             break
         moved = _moved(piece, found, moved)
         try:
-            piece = _after(scene, piece, stop, found, moved)
+            piece, contacts = _after(scene, piece, stop, found, moved, contacts, bounces)
         except SceneError as error:
             parts[-1] = replace(parts[-1], reason=error.faults[0])
             break
@@ -53,21 +67,30 @@ def motion_by(
     return _joined(parts)
 
 
-def _after(scene: Scene, piece: Scene, t: float, found: Motion, moved: dict[str, np.ndarray]) -> Scene:
-    """Return the piece that begins at t (s) with the velocities after the impact at the end of a motion."""
+def _after(
+    scene: Scene,
+    piece: Scene,
+    t: float,
+    found: Motion,
+    moved: dict[str, np.ndarray],
+    contacts: tuple[str, ...],
+    bounces: Bounces,
+) -> tuple[Scene, tuple[str, ...]]:
+    """Return the piece that begins at t (s) with the velocities after the impact at the end of a motion, and
+    the end stops in contact."""
     before = State(*(doubles(getattr(found, key)[-1]) for key in State._fields))
     after = later(scene, piece, t, before, moved)
-    return later(scene, piece, t, impact(after, before).state, moved)
+    state, contacts = bounces.meet(piece, after, before, contacts, moved)
+    return later(scene, piece, t, state, moved), contacts
 
 
 def _unmoved(scene: Scene) -> dict[str, np.ndarray]:
-    """Return zero angle and displacement (2,) of the joints with loads."""
-    return {load.joint: np.zeros(2) for load in scene.load if isinstance(load, JointLoad)}
+    """Return zero angle and displacement (2,) of the followed joints."""
+    return {name: np.zeros(2) for name in followed(scene)}
 
 
 def _moved(piece: Scene, found: Motion, before: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return angle (rad) and displacement (m) (2,) at the end of a piece, since t = 0, of joints with
-    loads."""
+    """Return angle (rad) and displacement (m) (2,) at the end of a piece, since t = 0, of followed joints."""
     if not before:
         return before
     place, turn, spin = map(doubles, (found.position, found.orientation, found.angular_velocity))

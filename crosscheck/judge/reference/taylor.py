@@ -145,9 +145,9 @@ class Stepper:
     def _start(self) -> None:
         """Project the coordinates onto the rows, and compute the velocities by the documented rule."""
         self._project()
-        held, v = self._held, self._v[:, :-4].ravel()
-        rows = held.all_gradients(self._x, held.drives(self.t, 1))[: held.count].reshape(held.count, v.size)
-        rates = rows @ v - self._gaps(held)[1]
+        held, drives = self._held, self._held.drives(self.t, 1)
+        rows = held.all_gradients(self._x, drives, self._turned)[: held.count].reshape(held.count, -1)
+        rates = rows @ self._v[:, :-4].ravel() - self._gaps(held)[1]
         mass = np.kron(np.eye(3, dtype=int), self.of.mass) + self.of.joints.mass(self._x)
         v = start_velocities(self.of.arithmetic, rows, rates, *self.of.given_velocities(self._x), mass)
         self._v[:, :-4] = v.reshape(3, -1)
@@ -175,13 +175,13 @@ class Stepper:
 
     def _choice(self, x: np.ndarray, t: Any) -> tuple[HeldRows, int]:
         """Return independent rows at the coordinates x, and the number of well-conditioned rows."""
-        rows, pivots = independent(self._every.unit_gradient(x, t), self._weights)
+        rows, pivots = independent(self._every.unit_gradient(x, t, self._turned), self._weights)
         return HeldRows(self.of, rows), int((pivots > NEW_ROW).sum())
 
     def _sharp(self, x: np.ndarray, t: Any) -> float:
         """Return the smallest singular value of the selected rows, scaled to unit length."""
         ask()
-        return float(np.linalg.svd(self._held.unit_gradient(x, t), compute_uv=False)[-1])
+        return float(np.linalg.svd(self._held.unit_gradient(x, t, self._turned), compute_uv=False)[-1])
 
     def _choose_again(self) -> None:
         """Select other rows if the present rows are ill-conditioned and the position is not singular.
@@ -212,7 +212,7 @@ class Stepper:
 
     def _refuse_undetermined(self) -> None:
         """Raise Ended if a degree of freedom has neither driver nor inertia."""
-        rows = self._held.unit_gradient(self._x, self.t)
+        rows = self._held.unit_gradient(self._x, self.t, self._turned)
         free = np.linalg.svd(rows, full_matrices=True)[2][len(rows) :].reshape(-1, 3, 4 * self.of.nb)
         if not self.of.scene.has_mass() and len(free):
             raise Ended("bodies without mass have to be driven in every freedom")
@@ -239,7 +239,7 @@ class Stepper:
         arithmetic, held = self.of.arithmetic, self._held
         if not held.count:
             return
-        rows, still = held.all_gradients(self._x, held.drives(self.t, 1)), 0 * self._x[:, :-4]
+        rows, still = held.all_gradients(self._x, held.drives(self.t, 1), self._turned), 0 * self._x[:, :-4]
         system = SaddlePoint(self.of.mass, rows, held.compliance(arithmetic.zeros), arithmetic)
         free = arithmetic.zeros(len(rows) - held.count)
         for level, rounds in ((0, 4), (1, 2)):

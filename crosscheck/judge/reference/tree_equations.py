@@ -14,6 +14,7 @@ from scipy.linalg import qr
 
 from crosscheck.judge import constraints
 from crosscheck.judge.arithmetic import DOUBLE, Arithmetic, doubles
+from crosscheck.judge.coupling_laws import law_value
 from crosscheck.judge.reference.start_velocities import given, start_velocities
 from crosscheck.judge.reference.tree_closures import Closures, Measured, Rows
 from crosscheck.judge.reference.tree_joints import Placed, Tree, used_coordinates
@@ -63,13 +64,15 @@ class TreeEquations:
         at |= {key: self.tree.scalars + k for k, key in enumerate(away)}
         driven = [(str(scene.joint_named(d.joint).facts.driven), d.joint) for d in scene.driver]
         self.driven = np.array([at[key] for key in driven], dtype=int)
-        # of couplings, padded with coordinates of factor 0 where others sum more coordinates
+        # of couplings, padded with coordinates of law 0 where others sum more coordinates, or higher powers
         ends = [[at[kind, joint.name] for joint, kind in scene.coupled(c)] for c in scene.coupling]
         most = max(map(len, ends), default=2)
         padded = [own + own[:1] * (most - len(own)) for own in ends]
         self.coupled = np.array(padded, dtype=int).reshape(-1, most).T
-        factors = [(*c.factors, *[0.0] * (most - len(c.factors))) for c in scene.coupling]
-        self.factors = arithmetic.array(factors).reshape(-1, most).T
+        powers = max((c.powers for c in scene.coupling), default=1)
+        laws = [[*c.laws, *[()] * (most - len(c.laws))] for c in scene.coupling]
+        factors = [[(*law, *[0.0] * (powers - len(law))) for law in own] for own in laws]
+        self.laws = np.moveaxis(arithmetic.array(factors).reshape(-1, most, powers), 0, 2)
         self.loads = Loads(self.tree, at)
         self.nv = len(self.tree.axis)
         self.ends = np.cumsum([self.tree.scalars, 4 * len(self.tree.balls), len(away), self.nv])
@@ -85,7 +88,7 @@ class TreeEquations:
         rng, closing = np.random.default_rng(seed), self.closures.sizes(self.length)
         self._rate_sizes = np.where(self.tree.turning, 1.0, self.length)
         sizes = self._coordinate_sizes()
-        coupled = (np.abs(doubles(self.factors)) * sizes[self.coupled]).max(axis=0)
+        coupled = (np.abs(doubles(self.laws[:, 0])) * sizes[self.coupled]).max(axis=0)
         self._row_sizes = np.concatenate([closing, sizes[self.driven], coupled])
         self._weights = 1 + (PREFERENCE * rng.random(len(self._row_sizes)) if seed else 0.0)
         self._displaced = self.arithmetic.array(displaced * closing * rng.uniform(-1, 1, len(closing)))
@@ -131,19 +134,21 @@ class TreeEquations:
         wanted = self._wanted(t)
         driven = coordinates.among(self.driven)
         driven = Rows(driven.value - wanted[0], driven.drift - wanted[2], driven.jacobian)
-        coupled = self._coupled(coordinates)
+        coupled = self._coupled(coordinates, rate)
         speed = [apply(closing.jacobian, rate), apply(driven.jacobian, rate) - wanted[1]]
         speed.append(apply(coupled.jacobian, rate))
         rows = closing.joined(driven).joined(coupled)
         return Instant(placed, coordinates, rows, np.concatenate(speed, axis=1), rate)
 
-    def _coupled(self, coordinates: Rows) -> Rows:
-        """Return the sums of the couplings' coordinates times their factors."""
-        rows = [coordinates.among(numbers) for numbers in self.coupled]
-        found = [
-            Rows(f * r.value, f * r.drift, f[:, None] * r.jacobian)
-            for f, r in zip(self.factors, rows, strict=True)
-        ]
+    def _coupled(self, coordinates: Rows, rate: np.ndarray) -> Rows:
+        """Return the sums of the laws of the couplings' coordinates."""
+        found = []
+        for law, numbers in zip(self.laws, self.coupled, strict=True):
+            row = coordinates.among(numbers)
+            value, slope, bend = (law_value(list(law), row.value, n) for n in range(3))
+            speed = apply(row.jacobian, rate)
+            drift = slope * row.drift + bend * speed * speed
+            found.append(Rows(value, drift, slope[..., None] * row.jacobian))
         total = found[0]
         for each in found[1:]:
             total = Rows(total.value + each.value, total.drift + each.drift, total.jacobian + each.jacobian)

@@ -15,7 +15,7 @@ from numpy import inf, log
 from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import OK
 from mbref.linear_algebra.elimination import determinant, product_of_pivots
-from mbref.taylor.angles import add_angle_gradients
+from mbref.taylor.coupled_coordinates import add_gradients
 from mbref.taylor.layout import DETERMINANT, GRADIENT
 from mbref.taylor.partition import freedoms
 
@@ -31,7 +31,7 @@ def evaluate_gradient(y, memory):
     for e in range(rows.row.shape[0]):
         if rows.lane[e] < work.shape[1]:
             work[rows.row[e], rows.lane[e]] += rows.weight[e] * y[0, rows.other[e]]
-    add_angle_gradients(y, work, memory)
+    add_gradients(y, work, memory)
     return OK
 
 

@@ -41,8 +41,9 @@ def put_code(taylor: TaylorMemory) -> Code:
 
 def code_of(taylor: TaylorMemory, names: Sequence[str]) -> Code:
     """Return the code of functions of a scene, made or loaded; raises NoGeneratedCode."""
-    if (taylor.polynomials.torsions.row >= 0).any():
-        raise NoGeneratedCode("the rows of couplings of angles are no products of series")
+    coordinates = taylor.polynomials.torsions, taylor.polynomials.slides
+    if any((each.row >= 0).any() for each in coordinates):
+        raise NoGeneratedCode("the rows of couplings of angles or of powers are no products of series")
     if PLAIN:
         raise NoGeneratedCode("without the JIT there is no machine code")
     lanes = taylor.series.terms.shape[1]

@@ -122,16 +122,6 @@ def test_offset_of_a_sum_is_met_by_the_least_displacement():
     assert found == pytest.approx(0.03 * RATIOS / INERTIAS / (RATIOS**2 / INERTIAS).sum(), rel=0.005)
 
 
-def test_two_joints_with_ratios_move_as_with_their_ratio():
-    """-3 φ_A + 2 φ_C = 0 is φ_C = 1.5 φ_A."""
-    pair = {"name": "gears", "joints": ["A", "C"]}
-    one, other = (
-        mbref.simulate(differential(coupling=[{**pair, **ratio}]), times=TIMES)
-        for ratio in ({"ratios": [-3.0, 2.0]}, {"ratio": 1.5})
-    )
-    assert one.orientation == pytest.approx(other.orientation, abs=CLOSE)
-
-
 def test_sum_along_skew_axes_of_a_chain_has_the_judges_accelerations():
     """Joints of moving bodies, an angle and displacements; Gauss's principle of the judge at the start. The
     energy (J) and the joints (m) keep their values to 1000 rtol and to rounding."""

@@ -15,7 +15,7 @@ ROUNDED = 1e-12  # coefficient of a tendon / largest one; smaller ones are round
 
 
 def of_equalities(mujoco: Any, model: Any) -> Iterator[JointRow | Part | str]:
-    """Return a row for each active equality that locks or couples hinges and slides linearly.
+    """Return a row for each active equality that locks or couples hinges and slides.
 
     Other active equalities, except connects and welds, are parts to be left out, and are made inactive in the
     model. An inactive equality yields a note.
@@ -55,13 +55,14 @@ def _row(mujoco: Any, model: Any, e: int, name: str) -> JointRow | Part:
         return Part("couplings", label)
     second = int(model.eq_obj2id[e])
     offset, ratio = (float(number) for number in model.eq_data[e, :2])
-    if second >= 0 and np.any(model.eq_data[e, 2:5]):
+    higher = tuple(-float(number) for number in np.trim_zeros(model.eq_data[e, 2:5], "b"))
+    if second >= 0 and higher and kind != kinds.mjEQ_JOINT:
         return Part("couplings", f"{label}, whose polynomial is not linear")
     first = int(model.eq_obj1id[e])
     if kind == kinds.mjEQ_JOINT:
-        if second < 0 or not ratio:
+        if second < 0 or not (ratio or higher):
             return JointRow(name, (first,), offset, (1.0,))
-        return JointRow(name, (first, second), offset, (1.0, -ratio))
+        return JointRow(name, (first, second), offset, (1.0, -ratio), higher)
     return _tendon_row(mujoco, model, name, label, [(first, 1.0), (second, -ratio)], offset)
 
 

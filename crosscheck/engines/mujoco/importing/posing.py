@@ -27,13 +27,20 @@ RANK = 1e-9  # singular value / largest singular value; smaller values belong to
 class JointRow:
     """A sum of joint coordinates that is constant: Σ factors[k] · q_k = offset, measured from the reference.
 
-    The first factor is 1. ``joints`` are MuJoCo's numbers.
+    The first factor is 1. ``joints`` are MuJoCo's numbers. ``higher`` are the factors of the square and of
+    higher powers of the second coordinate in the sum.
     """
 
     name: str
     joints: tuple[int, ...]
     offset: float
     factors: tuple[float, ...]
+    higher: tuple[float, ...] = ()
+
+    @property
+    def law(self) -> np.polynomial.Polynomial:
+        """Polynomial of the second coordinate that the first one follows, without the offset."""
+        return -np.polynomial.Polynomial([0.0, *self.factors[1:2], *self.higher])
 
 
 class Poses:
@@ -205,12 +212,19 @@ class Poses:
         found = np.zeros((1, self.model.nv))
         for joint, factor in zip(row.joints, row.factors, strict=True):
             found[0, self.model.jnt_dofadr[joint]] += factor
+        if row.higher:
+            leader = row.joints[1]
+            found[0, self.model.jnt_dofadr[leader]] = -row.law.deriv()(self.moved(leader))
         return found
 
     def _residual(self, row: JointRow) -> float:
-        return sum(f * self._moved(j) for j, f in zip(row.joints, row.factors, strict=True)) - row.offset
+        if row.higher:
+            follower, leader = map(self.moved, row.joints)
+            return follower - float(row.law(leader)) - row.offset
+        return sum(f * self.moved(j) for j, f in zip(row.joints, row.factors, strict=True)) - row.offset
 
-    def _moved(self, joint: int) -> float:
+    def moved(self, joint: int) -> float:
+        """Return the coordinate of a hinge or slide, measured from the reference."""
         address = self.model.jnt_qposadr[joint]
         return float(self.data.qpos[address] - self.model.qpos0[address])
 

@@ -275,6 +275,9 @@ class _Reader:
             driven = tuple(joint.facts.driven for joint in joints)
             law: dict[str, Any] = {"ratio": -row.factors[1]}
             law = law if len(names) == 2 else {"ratios": row.factors[::-1]}
+            if row.higher:
+                here = np.polynomial.Polynomial([self.poses.moved(row.joints[1]), 1.0])
+                law = {"polynomial": tuple(row.law(here).coef[1:].tolist())}
             law["coordinates"] = None if kinds == driven and len(set(names)) == len(names) else kinds
             self.couplings.append(entry(f"equality {row.name!r}", Coupling, name=name, joints=names, **law))
 

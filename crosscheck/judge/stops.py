@@ -1,0 +1,110 @@
+"""End stops by the judge: gaps of coordinates, impacts with restitution, contacts that last.
+
+A gap is sign · (limit - q) of a joint's coordinate q since t = 0. Where it closes, its rate becomes
+-e times the rate before. A coordinate in contact is a driver that stands still.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from crosscheck.judge.constraints import joint_rates, scene_length
+from crosscheck.judge.impacts import Impact, impact
+from crosscheck.judge.joint_coordinates import COORDINATES, coordinate_accelerations
+from crosscheck.judge.joint_residuals import grounded, joint_frames, with_ground
+from crosscheck.judge.pieces import State
+from mbref.scene import Driver, Scene
+
+TOUCHING = 1e-11  # gap (lengths of the mechanism, or rad) of a coordinate at its end
+STILL = 1e-12  # rate of a gap / largest velocity, which rounding may leave
+CHATTER = 1e-6  # flight between two impacts / end time, below which a coordinate stays at its end
+
+
+class End(NamedTuple):
+    """An end of a joint's range, such as ``A.upper``; ``column`` is 0 for an angle, 1 for a displacement."""
+
+    name: str
+    joint: str
+    column: int
+    limit: float
+    sign: float
+    restitution: float
+
+
+def ends_of(scene: Scene) -> list[End]:
+    """Return the ends of all ranges of a scene."""
+    found = []
+    for joint in scene.joint:
+        for name, sign in (("lower", -1.0), ("upper", 1.0)):
+            limit = getattr(joint.end_stop, name) if joint.end_stop else None
+            if limit is not None and joint.facts.driven:
+                column, e = COORDINATES.index(joint.facts.driven), joint.end_stop.restitution
+                found.append(End(f"{joint.name}.{name}", joint.name, column, limit, sign, e))
+    return found
+
+
+def held(piece: Scene, names: Collection[str]) -> Scene:
+    """Return a piece whose joints with these ends stay where they are."""
+    return _driven(piece, {name.rpartition(".")[0]: 0.0 for name in names})
+
+
+def _driven(piece: Scene, rates: Mapping[str, float]) -> Scene:
+    """Return a piece with drivers that prescribe rates (rad/s or m/s) of joints."""
+    drivers = [Driver(joint=joint, polynomial=(0.0, rate)) for joint, rate in rates.items()]
+    return piece.with_(driver=[*piece.driver, *drivers]) if drivers else piece
+
+
+def rates_of(piece: Scene, ends: Sequence[End], state: State) -> np.ndarray:
+    """Return the rates (e,) of gaps in a state."""
+    found = joint_rates(piece, *state)
+    return np.array([-end.sign * found[end.joint][end.column] for end in ends])
+
+
+def second_rates(
+    piece: Scene, ends: Sequence[End], state: State, acceleration: np.ndarray, spin_rate: np.ndarray
+) -> np.ndarray:
+    """Return the second derivatives (e,) of gaps from accelerations (nb, 3) of the bodies."""
+    joints = {joint.name: joint for joint in joint_frames(piece)}
+    pose = with_ground(state.position, state.orientation)
+    rates = map(grounded, (state.velocity, state.angular_velocity, acceleration, spin_rate))
+    motion = (*pose, *rates)
+    return np.array(
+        [-end.sign * coordinate_accelerations(joints[end.joint], *motion)[end.column] for end in ends]
+    )
+
+
+def bounced(after: Scene, before: State, touching: Sequence[End], wanted: Mapping[End, float]) -> Impact:
+    """Return the impact after which gaps have the wanted rates; other gaps that would close stay closed."""
+    rates = dict(wanted)
+    while True:
+        driven = {end.joint: -end.sign * rate for end, rate in rates.items()}
+        found = impact(_driven(after, driven), before)
+        left = [end for end in touching if end not in rates]
+        closing = rates_of(after, left, found.state) < -still(after, before)
+        if not closing.any():
+            return found
+        rates |= {end: 0.0 for end, closes in zip(left, closing, strict=True) if closes}
+
+
+def hits(piece: Scene, touching: Sequence[End], before: State, contacts: Collection[str]) -> dict[End, float]:
+    """Return the ends that are met, with the rates of their gaps after the impact."""
+    rates, least = rates_of(piece, touching, before), still(piece, before)
+    return {
+        end: -end.restitution * rate
+        for end, rate in zip(touching, rates, strict=True)
+        if rate < -least and end.name not in contacts
+    }
+
+
+def still(scene: Scene, state: State) -> float:
+    """Return the rate of a gap (m/s or rad/s) that is rounding."""
+    largest = max(float(np.abs(state.velocity).max()), float(np.abs(state.angular_velocity).max()))
+    return STILL * max(largest, 1e-300)
+
+
+def width(scene: Scene, end: End) -> float:
+    """Return the gap (m or rad) below which a coordinate touches its end."""
+    return TOUCHING * (scene_length(scene) if end.column else 1.0)

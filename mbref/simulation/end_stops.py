@@ -1,0 +1,198 @@
+"""End stops of joint coordinates: the impacts where gaps close, and the contacts that last.
+
+The gap g of a coordinate to an end of its range is not negative. Where it closes, velocities jump such that
+its rate becomes g'+ = -e g'-, by impulses of all constraints. A coordinate that does not leave the end is
+held there by a row while the force of this row pushes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from mbref.equations.impacts import Impact, impact
+from mbref.motions.driving_forces import coordinate_acceleration
+from mbref.motions.joint_motion import along, joint_motion
+from mbref.motions.motion import Motion
+from mbref.motions.pieces import in_contact
+from mbref.motions.trajectory import Trajectory
+from mbref.scene import Driver, Scene, SceneError
+from mbref.scene.joints import DISPLACEMENT, Coordinate
+from mbref.simulation.zeros import PULL, Signal, first_zero
+
+GAP_CLOSED = 1e-12  # gap (lengths of the mechanism, or rad) of a coordinate at its end
+GAP_ROUNDED = 1e-14  # gap (lengths, or rad) that rounding may leave in a motion
+AT_REST_RATE = 1e-12  # rate of a gap / largest rate before the impact that rounding may leave
+LOOK = 1e-6  # time after an event / end time, at which the force of a contact has its sign
+CHATTER = 1e-6  # flight between two impacts / end time, below which the coordinate stays at its end
+
+
+class Side(NamedTuple):
+    """An end of the range of a coordinate q: the gap is sign · (limit - q)."""
+
+    name: str
+    joint: str
+    coordinate: Coordinate
+    limit: float
+    sign: float
+    restitution: float
+
+    def gap(self, scene: Scene, motion: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+        """Return the gap and its rate (k,), with coordinates since the poses of the scene."""
+        value, rate = along(joint_motion(scene, motion, self.joint), self.coordinate)
+        return self.sign * (self.limit - value), -self.sign * rate
+
+    def push(self, motion: Motion) -> np.ndarray:
+        """Return the force (N) or torque (N m) (k,) that keeps the coordinate in its range, in contact."""
+        found = motion.driver(self.joint)
+        force = found.force if self.coordinate == DISPLACEMENT else found.torque
+        return -self.sign * np.asarray(force)
+
+
+class StopsMet(NamedTuple):
+    """Velocities after an event at stops: the impact, the sides that were met, and the contacts after it;
+    ``chatter`` are sides whose bounces end there."""
+
+    found: Impact
+    hits: tuple[str, ...]
+    contacts: tuple[str, ...]
+    chatter: tuple[str, ...]
+
+
+class EndStops:
+    """The end stops of a scene, with the function that runs a piece at times (k,), s."""
+
+    def __init__(self, scene: Scene, run: Callable[[Scene, np.ndarray], Motion], end: float):
+        self.scene, self._run, self._end = scene, run, end
+        self.sides = [*_sides(scene)]
+        points = np.array([body.position for body in scene.body] + [j.anchor_pair[0] for j in scene.joint])
+        self._length = float(np.ptp(points, axis=0).max(initial=0.0)) or 1.0
+
+    def _least(self, side: Side) -> float:
+        return GAP_CLOSED * (self._length if side.coordinate == DISPLACEMENT else 1.0)
+
+    def first_event(
+        self, piece: Scene, contacts: Sequence[str], turned: Mapping[str, float], end: float
+    ) -> float | None:
+        """Return the time (s) in a piece at which a stop is met or a contact would pull; None without one."""
+        held = in_contact(piece, contacts)
+        signals = []
+        for side in self.sides:
+            if side.name in contacts:
+                signals.append(Signal(side.push))
+            elif side.joint not in {name.rpartition(".")[0] for name in contacts}:
+                value, rate = (self._part(side, turned, k) for k in (0, 1))
+                signals.append(Signal(value, rate, GAP_ROUNDED / GAP_CLOSED * self._least(side)))
+        return first_zero(lambda times: self._run(held, times), signals, end) if signals else None
+
+    def _part(self, side: Side, turned: Mapping[str, float], part: int) -> Callable[[Motion], np.ndarray]:
+        return lambda motion: side.gap(self.scene, _counted(motion, turned))[part]
+
+    def starts(self, state: Trajectory) -> bool:
+        """Return whether a coordinate starts at an end; raises SceneError if it starts beyond one."""
+        gaps = {side: float(side.gap(self.scene, state)[0][0]) for side in self.sides}
+        for side, gap in gaps.items():
+            if gap < -self._least(side):
+                raise SceneError([f"joint[{side.joint}].stop: the start is beyond its end by {-gap:.3g}"])
+        return any(gap <= self._least(side) for side, gap in gaps.items())
+
+    def meet(self, before: Scene, after: Scene, state: Trajectory, contacts: Sequence[str]) -> StopsMet:
+        """Return the event of a state at t: velocities after it, and the contacts that last.
+
+        ``before`` and ``after`` are the scenes of both pieces, at the poses of the state.
+        """
+        touching = [s for s in self.sides if s.gap(self.scene, state)[0][0] <= 10 * self._least(s)]
+        rates = {side: float(side.gap(self.scene, state)[1][0]) for side in touching}
+        speeds = (float(np.abs(x).max()) for x in (state.velocity, state.angular_velocity))
+        still = AT_REST_RATE * max(1e-300, *speeds)
+        hits = [side for side in touching if rates[side] < -still and side.name not in contacts]
+        wanted = {side: -side.restitution * rates[side] for side in hits}
+        found, chatter = self._impact(before, after, state, touching, wanted, still), list[Side]()
+        for side in hits:
+            if wanted[side] > still and self._flight(after, found, side, wanted[side]) < CHATTER * self._end:
+                chatter.append(side)
+        if chatter:
+            wanted |= dict.fromkeys(chatter, 0.0)
+            found = self._impact(before, after, state, touching, wanted, still)
+        resting = [s for s in touching if abs(self._rate(s, state, found)) <= still]
+        lasting = self._lasting(with_impact(after, found), resting)
+        names = [tuple(side.name for side in sides) for sides in (hits, lasting, chatter)]
+        return StopsMet(found, *names)
+
+    def _impact(
+        self,
+        before: Scene,
+        after: Scene,
+        state: Trajectory,
+        touching: Sequence[Side],
+        wanted: Mapping[Side, float],
+        still: float,
+    ) -> Impact:
+        """Return the impact with given rates of gaps after it; other gaps that would close stay closed."""
+        rates = dict(wanted)
+        while True:
+            driven = [Driver(joint=s.joint, polynomial=(0.0, -s.sign * rate)) for s, rate in rates.items()]
+            found = impact(before, after.with_(driver=[*after.driver, *driven]))
+            closing = [s for s in touching if s not in rates and self._rate(s, state, found) < -still]
+            if not closing:
+                return found
+            rates |= dict.fromkeys(closing, 0.0)
+
+    def _rate(self, side: Side, state: Trajectory, found: Impact) -> float:
+        moved = replace(state, velocity=found.velocity[None], angular_velocity=found.angular_velocity[None])
+        return float(side.gap(self.scene, moved)[1][0])
+
+    def _flight(self, after: Scene, found: Impact, side: Side, rate: float) -> float:
+        """Return the time (s) until the gap closes again, at the acceleration after the impact."""
+        piece = with_impact(after, found)
+        motion = self._run(piece, np.zeros(1))
+        if not len(motion.times) or motion.acceleration is None:
+            return np.inf
+        joint = piece.joint_named(side.joint)
+        second = -side.sign * float(coordinate_acceleration(piece, motion, joint, side.coordinate)[0])
+        return -2 * rate / second if second < 0 else np.inf
+
+    def _lasting(self, piece: Scene, resting: Sequence[Side]) -> list[Side]:
+        """Return the sides at which contacts push, among those whose gaps neither open nor close."""
+        held = [*resting]
+        while held:
+            held_piece = in_contact(piece, [side.name for side in held])
+            motion = self._run(held_piece, np.array([LOOK * self._end]))
+            pushes = [float(side.push(motion)[0]) for side in held] if len(motion.times) else [0.0]
+            if min(pushes) > PULL * max(map(abs, pushes)):
+                break
+            del held[int(np.argmin(pushes))]
+        return held
+
+
+def _sides(scene: Scene) -> list[Side]:
+    """Return the ends of all ranges, named such as ``"A.upper"``."""
+    found = []
+    for joint in scene.joint:
+        for end, sign in (("lower", -1.0), ("upper", 1.0)):
+            stop, coordinate = joint.end_stop, joint.facts.driven
+            if stop and coordinate and (limit := getattr(stop, end)) is not None:
+                found.append(
+                    Side(f"{joint.name}.{end}", joint.name, coordinate, limit, sign, stop.restitution)
+                )
+    return found
+
+
+def _counted(motion: Trajectory, turned: Mapping[str, float]) -> Trajectory:
+    """Return the motion of a piece with angles since t = 0, from the angles (rad) at its begin."""
+    angles = {name: each + turned.get(name, 0.0) for name, each in (motion.angles or {}).items()}
+    return replace(motion, angles=angles)
+
+
+def with_impact(scene: Scene, found: Impact) -> Scene:
+    """Return a scene with the velocities after an impact."""
+    rates = zip(scene.body, found.velocity.tolist(), found.angular_velocity.tolist(), strict=True)
+    return scene.with_(
+        body=[
+            body.model_copy(update={"velocity": tuple(v), "angular_velocity": tuple(w)})
+            for body, v, w in rates
+        ]
+    )

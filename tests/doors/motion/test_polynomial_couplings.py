@@ -1,0 +1,106 @@
+"""Couplings by a polynomial, q₂ = P(q₁): closed forms, restarts, offsets, the judge, MJCF."""
+
+import numpy as np
+import pytest
+
+import mbref
+from crosscheck.engine import engine
+from crosscheck.judge.arithmetic import EXTENDED, doubles
+from crosscheck.judge.driver_forces import driver_forces
+from crosscheck.judge.metrics import measure
+from crosscheck.judge.reference.taylor import natural_motion
+from crosscheck.judge.reference.tree import tree_motion
+from mbref import Scene
+from mbref.cli import main
+from tests.helpers.coupled_mechanisms import body
+from tests.helpers.parts import X, Z, hinge, slide
+
+LAW = (0.5, 0.3, -0.02)
+P = np.polynomial.Polynomial([0.0, *LAW])
+SPEED, TIMES = 4.0, np.linspace(0.0, 2.0, 9)  # 8 rad, so that the slope depends on full turns
+INERTIA = {"A": 0.3, "B": 2.0}  # kg m² about the hinge's axis, or kg along the slide
+ROUNDED = 1e-12  # relative to the largest value, some thousand roundings
+TOLERANCE = 1e-9  # of free motions, by the default tolerance 1e-10
+METHODS = pytest.mark.parametrize("method", ["taylor", "alf-dual+projection/dop853"])
+
+
+def cam(lead: str = "angle", follow: str = "displacement", **changes) -> Scene:
+    """Two bodies on the ground, whose coordinates along hinges or slides are coupled by the law P."""
+    parts, rate = {"body": [], "joint": []}, [0.0, 0.0, SPEED] if lead == "angle" else [SPEED, 0.0, 0.0]
+    given = {"angular_velocity" if lead == "angle" else "velocity": rate}
+    for name, kind, place in (("A", lead, (0.0, 0.0, 0.0)), ("B", follow, (0.0, 1.0, 0.0))):
+        parts["body"].append(body(name.lower(), INERTIA[name], [INERTIA[name]] * 3, place, **given))
+        maker, axis, given = (*((hinge, Z) if kind == "angle" else (slide, X)), {})
+        parts["joint"].append(maker(name, "ground", name.lower(), place, axis))
+    coupling = [{"name": "cam", "joints": ["A", "B"], "polynomial": list(LAW)}]
+    return Scene(**{"name": "cam", "duration": 2.0, **parts, "coupling": coupling, **changes})
+
+
+def coordinate(motion, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a joint's angle or displacement, its rate, and the reaction along it."""
+    found = motion.joint(name)
+    if found.angle is not None:
+        return found.angle, found.rate, found.moment[:, 2]
+    return found.displacement, found.displacement_rate, found.force[:, 0]
+
+
+@METHODS
+@pytest.mark.parametrize("follow", ["angle", "displacement"])
+def test_driven_leader_moves_its_follower_by_the_polynomial(follow, method):
+    """q₁ = ω t gives q₂ = P, q₂' = P' ω, q₂'' = P'' ω², and the torque P' · I₂ P'' ω² of the driver."""
+    scene = cam(follow=follow, driver=[{"joint": "A", "polynomial": [0.0, SPEED]}])
+    motion, q = mbref.simulate(scene, method, times=TIMES), SPEED * TIMES
+    second = motion.angular_acceleration[:, 1, 2] if follow == "angle" else motion.acceleration[:, 1, 0]
+    torque = P.deriv()(q) * INERTIA["B"] * P.deriv(2)(q) * SPEED**2
+    wanted = P(q), P.deriv()(q) * SPEED, P.deriv(2)(q) * SPEED**2, torque, torque
+    forces = motion.driver("A").torque, driver_forces(scene, motion)["A"]
+    for found, exact in zip((*coordinate(motion, "B")[:2], second, *forces), wanted, strict=True):
+        assert np.abs(found - exact).max() <= ROUNDED * np.abs(exact).max()
+
+
+@METHODS
+@pytest.mark.parametrize("lead", ["angle", "displacement"])
+def test_coupling_conserves_energy_and_transmits_no_power(lead, method):
+    """(I₁ + P'² I₂) q₁'² is constant; the coupling's forces -P' μ and μ have no power together."""
+    motion = mbref.simulate(cam(lead), method, times=TIMES)
+    (q, rate, force), (value, follower, push) = coordinate(motion, "A"), coordinate(motion, "B")
+    reduced = INERTIA["A"] + P.deriv()(q) ** 2 * INERTIA["B"]
+    assert np.abs(rate - rate[0] * np.sqrt(reduced[0] / reduced)).max() <= TOLERANCE * SPEED
+    assert np.abs(value - P(q)).max() <= ROUNDED * np.abs(P(q)).max()
+    assert np.abs(force * rate + push * follower).max() <= 10 * ROUNDED * np.abs(force * rate).max()
+    later = mbref.simulate(motion.scene_at(TIMES[4]), method, times=TIMES[4:] - TIMES[4])
+    assert np.abs(later.position - motion.position[4:]).max() <= TOLERANCE
+
+
+def test_formulations_of_the_judge_agree_with_mbref_over_full_turns():
+    scene, times = cam(), TIMES[[0, 8]]
+    one, other = natural_motion(scene, times, EXTENDED), tree_motion(scene, times, EXTENDED, seconds=60.0)
+    assert np.abs(doubles(one.position - other.position)).max() <= 1e-16  # extended precision
+    motion = mbref.simulate(scene, "taylor", times=times, rtol=1e-13)
+    assert np.abs(motion.position - doubles(one.position)).max() <= 10 * ROUNDED
+    found = measure(scene, motion, None)
+    assert max(found[f"violation_{level}"] for level in ("position", "velocity", "acceleration")) <= ROUNDED
+
+
+def test_offset_starts_at_a_pose_of_the_polynomial():
+    """q₂ = offset + P(q₁) holds at the start, and later, with coordinates from the poses in the file."""
+    motion = mbref.simulate(cam("displacement").with_("coupling[cam].offset", 1.2), times=TIMES)
+    q, value = (coordinate(motion, name)[0] for name in "AB")
+    assert np.abs(q[0]) > 0.1  # the start differs from the poses in the file
+    assert np.abs(value - 1.2 - P(q)).max() <= ROUNDED * np.abs(P(q)).max()
+
+
+def test_mjcf_keeps_the_polynomial_and_engines_without_it_refuse(tmp_path):
+    """A keyframe at q₁ = 1, q₂ = P(1) gives the polynomial from there: P', P''/2 and P'''/6."""
+    scene, file = tmp_path / "cam.toml", tmp_path / "cam.xml"
+    cam().save(scene)
+    main(["export", str(scene), "--out", str(file)])
+    main(["import", str(file), "--out", str(scene), "--force"])
+    assert Scene.from_file(scene).coupling == cam().coupling
+    key = f'<keyframe><key name="up" qpos="1 {P(1.0)}"/></keyframe></mujoco>'
+    file.write_text(file.read_text().replace("</mujoco>", key))
+    main(["import", str(file), "--keyframe", "up", "--out", str(scene), "--force"])
+    at = np.array(Scene.from_file(scene).coupling[0].polynomial)
+    assert np.abs(at - [P.deriv()(1.0), P.deriv(2)(1.0) / 2, LAW[2]]).max() <= ROUNDED
+    assert engine("mujoco").supports.missing(cam()) is None
+    assert "'cam' is a polynomial of degree 3" in str(engine("pinocchio").supports.missing(cam()))
