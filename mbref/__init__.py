@@ -12,7 +12,7 @@ from mbref.simulation import VERSION
 
 if TYPE_CHECKING:
     from mbref.design.along_motion import AlongMotion, along_motion
-    from mbref.design.derivatives.fit import Fit, fit
+    from mbref.design.derivatives.fit import FitResult, fit
     from mbref.design.derivatives.result import Sensitivities
     from mbref.design.derivatives.sensitivities import sensitivities
     from mbref.design.diagnosis import Diagnosis, diagnose
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 __version__ = VERSION
 
 _PUBLIC = {  # module → its public names
-    "design.derivatives.fit": ("Fit", "fit"),
+    "design.derivatives.fit": ("FitResult", "fit"),
     "design.derivatives.result": ("Sensitivities",),
     "design.derivatives.sensitivities": ("sensitivities",),
     "design.along_motion": ("AlongMotion", "along_motion"),
@@ -77,7 +77,7 @@ __all__ = [
     "Diagnosis",
     "Equilibrium",
     "ErrorEstimate",
-    "Fit",
+    "FitResult",
     "InputError",
     "Limits",
     "Matrices",

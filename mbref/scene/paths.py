@@ -9,7 +9,7 @@ from typing import Any
 from mbref.scene.fields import meant
 from mbref.scene.validation import SceneError
 
-COMPONENTS = ("x", "y", "z")  # of a vector
+VECTOR_COMPONENTS = ("x", "y", "z")  # of a vector
 PATH_STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[([^\]]+)\]")
 
 
@@ -62,7 +62,7 @@ def _place(entries: tuple[Any, ...], step: str, path: str) -> int:
         return names.index(step)
     if step.isdigit() and int(step) < len(entries):
         return int(step)
-    if step in COMPONENTS and len(entries) == len(COMPONENTS) and not any(tables):
-        return COMPONENTS.index(step)
+    if step in VECTOR_COMPONENTS and len(entries) == len(VECTOR_COMPONENTS) and not any(tables):
+        return VECTOR_COMPONENTS.index(step)
     named = [name for name in names if isinstance(name, str)]
     raise SceneError([f"{path}: the scene has no {step!r} there{meant(step, named)}"])

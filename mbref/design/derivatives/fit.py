@@ -24,13 +24,13 @@ from mbref.stepping.limits import Limits
 FIT_RTOL = 1e-10  # relative tolerance of the runs; derivatives then have about eight digits
 # singular value of the scaled Jacobian / largest one, below which the columns do not determine a combination
 INDETERMINATE = 1e-6
-TAKES_PART = 1e-3  # weight of a number in such a unit combination from which it takes part
+PART_OF_COMBINATION = 1e-3  # weight of a number in such a unit combination from which it takes part
 FIT_TOLERANCE = 1e-12  # relative changes of the sum of squares and of the numbers that end the iteration
 NOT_NEGATIVE = ("mass", "inertia", "stiffness", "damping", "natural_length", "armature")
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class FitResult:
     """Numbers of a scene that fit measured columns, at k times with c columns.
 
     Attributes
@@ -83,7 +83,7 @@ def fit(
     free: Sequence[str],
     of: Sequence[str] | None = None,
     limits: Limits | None = None,
-) -> Fit:
+) -> FitResult:
     """Return the scene whose motion is nearest to measured columns, by least squares over some numbers.
 
     Each column counts relative to its standard deviation over the samples. Derivatives are by
@@ -104,7 +104,7 @@ def fit(
 
     Returns
     -------
-    Fit
+    FitResult
         Fitted numbers, standard errors, correlations, and combinations that the columns do not determine.
 
     Raises
@@ -204,25 +204,29 @@ class _Problem:
         scaled = self._at(z)[1] / self.scales[:, None] * self.sizes
         return np.asarray(scaled.reshape(-1, len(self.free)))
 
-    def solution(self, z: np.ndarray, converged: bool) -> Fit:
+    def solution(self, z: np.ndarray, converged: bool) -> FitResult:
         """Return the fit with numbers z (p,), over their sizes."""
         residuals, off = self.residuals(z), self._at(z)[0]
         _, values, right = np.linalg.svd(self.jacobian(z), full_matrices=False)
         known = values > INDETERMINATE * values.max(initial=0.0)
         variance = residuals @ residuals / (residuals.size - known.sum())
         covariance = variance * (right[known].T / values[known] ** 2) @ right[known]
-        lost = (np.abs(right[~known]) > TAKES_PART).any(axis=0)
+        lost = (np.abs(right[~known]) > PART_OF_COMBINATION).any(axis=0)
         deviation = np.where(lost, np.nan, np.sqrt(np.diag(covariance)))
         with np.errstate(invalid="ignore"):
             correlations = covariance / np.outer(deviation, deviation)
         errors = np.where(lost, np.inf, deviation * self.sizes)
-        return Fit(
+        return FitResult(
             scene=self.scene_at(z),
             numbers=dict(zip(self.free, (z * self.sizes).tolist(), strict=True)),
             errors=dict(zip(self.free, errors.tolist(), strict=True)),
             correlations=correlations,
             undetermined=tuple(
-                {name: x for name, x in zip(self.free, row.tolist(), strict=True) if abs(x) > TAKES_PART}
+                {
+                    name: x
+                    for name, x in zip(self.free, row.tolist(), strict=True)
+                    if abs(x) > PART_OF_COMBINATION
+                }
                 for row in right[~known]
             ),
             deviations=dict(zip(self.measured, np.sqrt((off**2).mean(axis=0)).tolist(), strict=True)),
