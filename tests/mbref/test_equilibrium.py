@@ -74,7 +74,8 @@ def test_command_equilibrium_prints_stability_and_reactions_and_writes_the_pose(
     pendulum().save(path)
     assert main(["equilibrium", path, "--starts", "6", "--out", rest]) == 0
     shown = capsys.readouterr().out
-    assert "stable" in shown and "unstable" in shown and "Other equilibria may exist" in shown
+    assert "equilibrium 1: unstable\n" in shown and "equilibrium 2: stable\n" in shown
+    assert "Other equilibria may exist" in shown
     assert "force (0, 19.62, 0) N" in shown
     assert np.allclose(np.abs(Scene.from_file(rest).body[0].position), (0.0, ARM, 0.0), atol=POSE)
 
@@ -95,6 +96,7 @@ def test_number_of_an_equilibrium_beyond_those_found_is_refused(tmp_path, capsys
 
 
 def test_moment_that_allows_no_rest_is_named(tmp_path, capsys):
+    """20 N m are more than the weight resists, m g l = 13.7 N m."""
     path = str(tmp_path / "pushed.toml")
     pendulum(load=[{"type": "moment", "body": "rod", "moment": [0.0, 0.0, 20.0]}]).save(path)
     assert main(["equilibrium", path, "--starts", "2"]) == 2

@@ -173,7 +173,7 @@ TREES = {
 
 
 @pytest.mark.parametrize("what", [*TREES, "connect", "joint"])
-def test_accelerations_and_motion_are_mujocos_and_an_engine_without_dampers_is_named(what, tmp_path):
+def test_rows_and_accelerations_are_mujocos_and_an_engine_without_dampers_is_named(what, tmp_path):
     """MuJoCo's own terms at random states, with a spring and dampers, and without these, in trees, also with
     a ball and a free joint, with a loop and with a coupling."""
     if what in TREES:
