@@ -82,5 +82,6 @@ def _families(name: str, scene: Scene, part: str) -> list[list[Setting]]:
     for setting in engine(name).settings(scene):
         if part == WHOLE or (part == CXX) == setting.family.endswith("compiled"):
             families.setdefault(setting.family, []).append(setting)
+    assert families, "no family is tested"
     engine(name).prepare(list(families))
     return list(families.values())

@@ -293,7 +293,9 @@ def test_printed_command_of_a_record_repeats_its_run(capsys, still):
         (np.array([0.1, 0.25]), {"seconds": 0.5, "outcome": "NOT_FINITE"}),
     ]
     cases = [grid.Case(scene, times, FAKE, grid.Setting("a b", options)) for times, options in asked]
-    for record in grid.study(cases):
+    records = grid.study(cases)
+    assert [record["outcome"] for record in records] == ["COMPLETED", "NOT_FINITE"]
+    for record in records:
         program, *words = shlex.split(command(record, still))
         _, out, err = run_main(capsys, *words, "--json")
         [again] = json.loads(out)["records"]
