@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from mbref.design.derivatives.numbers_of_scene import SceneNumber
-from mbref.design.derivatives.states import Direction, States
+from mbref.design.derivatives.states import Direction, States, terms_along
 from mbref.design.differences import CENTRAL
+from mbref.equations.joint_angles import angles_at
 from mbref.equations.joint_reactions import reactions
 from mbref.equations.model import Model
 from mbref.equations.offsets import counted_angles
@@ -60,6 +61,15 @@ def _shared(motion: Motion) -> set[str]:
     return found
 
 
+def _angles(model: Model, states: States) -> np.ndarray:
+    """Return the angles (k, a) of turning joints at the poses of states, which polynomials of couplings
+    read."""
+    if not model.data.primitives.higher.any():
+        return states.angles
+    pairs = zip(states.q, states.angles, strict=True)
+    return np.array([angles_at(model, q, near) for q, near in pairs]).reshape(states.angles.shape)
+
+
 class Columns:
     """Columns (k, columns) of a motion as a function of its states."""
 
@@ -73,8 +83,8 @@ class Columns:
         q, v, a = states.q.reshape(k, nb, 7), states.v.reshape(k, nb, 6), states.a.reshape(k, nb, 6)
         wrenches = None
         if self._has_reactions and not model.kinematic:
-            blocks = model.terms(states.times, states.q).blocks
-            wrenches = reactions(model, q, blocks, states.multipliers)
+            blocks = terms_along(model, states).blocks
+            wrenches = reactions(model, q, blocks, states.multipliers, _angles(model, states))
         motion = replace(
             self.motion,
             mechanism=scene,

@@ -15,6 +15,7 @@ from mbref.design.derivatives.numbers_of_scene import SceneNumber, scene_number,
 from mbref.design.derivatives.panels import Precision, gauss
 from mbref.design.derivatives.result import Sensitivities
 from mbref.design.derivatives.start_numbers import StartNumber, is_of_start, start_number
+from mbref.design.derivatives.states import States
 from mbref.design.derivatives.variational import VariationalEquations
 from mbref.equations.model import Model
 from mbref.equations.offsets import assembled
@@ -79,7 +80,7 @@ def sensitivities(
         If the scene cannot be simulated, or has no number at a path.
     InputError
         If an output has no derivative, if the motion does not depend smoothly on a number, if a number moves
-        the time of a switch or opens a loop, or if constraints have intervals.
+        the time of a switch or opens a loop, or if constraints have intervals or end stops.
     """
     request = _Request(find_scene(scene), of, to, times)
     limits = limits or Limits(rtol=RTOL)
@@ -105,7 +106,7 @@ def motion_and_derivatives(
 def _refuse(scene: Scene, of: Sequence[str], to: Sequence[str]) -> None:
     """Raise InputError for scenes without derivatives, and for a request without outputs or numbers."""
     if is_intermittent(scene):
-        raise InputError(f"{scene.name}: constraints with intervals (`active`) have no derivatives here")
+        raise InputError(f"{scene.name}: intervals (`active`) and end stops have no derivatives here")
     for name, given in (("of", of), ("to", to)):
         if isinstance(given, str) or not len(given):
             raise InputError(f"{name}: needs a list of one name at least")
@@ -141,6 +142,7 @@ class _Request:
             count = f"{scene.name}: {self.model.m} constraint rows"
             raise InputError(f"{count}; derivatives are for up to {MOST_ROWS}")
         self.method = Method.parse(default_method(scene))
+        self.motion: Motion | None = None  # of the first solution
         fields = [label for label in labels if not is_of_start(label)]
         self.of_scene = [scene_number(scene, label, self.model) for label in fields]
         self.units = [unit_of_number(scene, label) for label in labels]
@@ -168,7 +170,21 @@ class _Request:
                 parts.append(columns.by_number(number, found.states))
             by_label[number.label] = np.sum(parts, axis=0)
         values, rounding = np.stack([by_label[label] for label in self.labels], axis=-1)
-        return _Solved(run, names, values, rounding)
+        self.motion = self.motion or motion
+        signs = self._signs(names, found.states)[..., None]
+        return _Solved(run, names, signs * values, rounding)
+
+    def _signs(self, names: Sequence[str], states: States) -> np.ndarray:
+        """Return -1 for columns (k, outputs) of quaternions that have the other sign in the first motion."""
+        assert self.motion is not None
+        k, model = states.times.size, self.model
+        arrays = states.q.reshape(k, -1, 7), states.v.reshape(k, -1, 6), states.a.reshape(k, -1, 6)
+        own = model.motion(*arrays)["orientation"]
+        signs = np.where((own * self.motion.orientation[:k]).sum(axis=2) < 0.0, -1.0, 1.0)
+        bodies = {f"{name}.orientation": b for b, name in enumerate(self.motion.bodies)}
+        places = [bodies.get(name.rpartition(".")[0]) for name in names]
+        columns = [np.ones(k) if place is None else signs[:, place] for place in places]
+        return np.array(columns).T.reshape(k, len(names))
 
     def errors(self, values: np.ndarray) -> np.ndarray:
         """Return the errors (k, o, p) that differences of the scene's arrays and of states leave in
@@ -186,7 +202,7 @@ def _compared(first: _Solved, second: _Solved, request: _Request) -> Sensitiviti
     values[:count] = second.values[:count]
     difference = np.abs(first.values[:count] - values[:count])
     errors[:count] = difference + second.rounding[:count] + request.errors(values[:count])
-    motion, t = second.run.motion, min(first.run.undecided_from, second.run.undecided_from)
+    motion, t = first.run.motion, min(first.run.undecided_from, second.run.undecided_from)
     outcome, message = motion.outcome, motion.message
     if count < motion.times.size:
         outcome = Outcome.UNDECIDED

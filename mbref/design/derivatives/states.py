@@ -13,7 +13,6 @@ import numpy as np
 from mbref import rotations
 from mbref.design.differences import CENTRAL
 from mbref.equations.coordinates import displace_all
-from mbref.equations.joint_angles import counted_from
 from mbref.equations.model import Model, Terms
 from mbref.kernels.scene_layout import SPRING
 
@@ -94,17 +93,7 @@ def _shortest_spring(model: Model, states: States) -> np.ndarray:
 
 def terms_along(model: Model, states: States) -> Terms:
     """Return the terms at states, with the angles of springs and couplings nearest to the states' angles."""
-    if not model.has_angles or not states.angles.size:
-        return model.terms(states.times, states.q, states.v)
-    half_turns = np.round(states.angles / np.pi)
-    changes = np.flatnonzero((np.diff(half_turns, axis=0) != 0.0).any(axis=1)) + 1
-    found = []
-    for part in np.split(np.arange(len(states.times)), changes):
-        with counted_from(model, np.pi * half_turns[part[0]]):
-            found.append(model.terms(*states.at(slice(part[0], part[-1] + 1))[:3]))
-    arrays = ("blocks", "phi", "nu", "gamma", "force")
-    joined = (np.concatenate([getattr(each, name) for each in found]) for name in arrays)
-    return Terms(model.structure, model.mass, *joined)
+    return model.terms(states.times, states.q, states.v, states.angles)
 
 
 def residuals(model: Model, states: States) -> np.ndarray:
