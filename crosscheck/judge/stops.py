@@ -38,11 +38,11 @@ def ends_of(scene: Scene) -> list[End]:
     """Return the ends of all ranges of a scene."""
     found = []
     for joint in scene.joint:
+        stop, driven = joint.end_stop, joint.facts.driven
         for name, sign in (("lower", -1.0), ("upper", 1.0)):
-            limit = getattr(joint.end_stop, name) if joint.end_stop else None
-            if limit is not None and joint.facts.driven:
-                column, e = COORDINATES.index(joint.facts.driven), joint.end_stop.restitution
-                found.append(End(f"{joint.name}.{name}", joint.name, column, limit, sign, e))
+            if stop and driven and (limit := getattr(stop, name)) is not None:
+                column = COORDINATES.index(driven)
+                found.append(End(f"{joint.name}.{name}", joint.name, column, limit, sign, stop.restitution))
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -184,6 +185,6 @@ def _moving(piece: Scene, state: State) -> Scene:
 
 def _as_trajectory(piece: Scene, found: Motion) -> Trajectory:
     """Return a motion as a trajectory in double precision."""
-    arrays = {key: doubles(getattr(found, key)) for key in FIELDS}
+    arrays: dict[str, Any] = {key: doubles(getattr(found, key)) for key in FIELDS}
     names = tuple(body.name for body in piece.body)
     return Trajectory(piece.name, "judge", "", "", {}, doubles(found.times), names, **arrays)
