@@ -92,7 +92,7 @@ def test_command_modes_prints_the_frequency_of_a_pendulum_and_draws_its_vibratio
 def test_number_of_an_equilibrium_beyond_those_found_is_refused(tmp_path, capsys):
     pendulum().save(path := tmp_path / "my.toml")
     assert main(["equilibrium", str(path), "--starts", "2", "--number", "9"]) == 2
-    assert "--number: must be from 1 to" in capsys.readouterr().err
+    assert "--number: must be from 1 to 2, got 9" in capsys.readouterr().err
 
 
 def test_moment_that_allows_no_rest_is_named(tmp_path, capsys):

@@ -5,6 +5,7 @@ import pytest
 
 import mbref
 from mbref.scene import Factor, JointForce, Scene, SceneError
+from mbref.scene.toml import scene_text
 from tests.helpers import loads_over_time as scenes
 from tests.helpers.loads_over_time import AXIS, WAVY
 
@@ -73,8 +74,6 @@ FAULTS = {
 def test_faulty_function_of_time_is_refused_by_path_and_line(message, tmp_path):
     text = scenes.pushed(Factor()).to_dict()
     text["load"][0]["factor"] = FAULTS[message]
-    from mbref.scene.toml import scene_text
-
     path = tmp_path / "slide.toml"
     path.write_text(scene_text(text))
     with pytest.raises(SceneError) as error:
