@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq, minimize
+from scipy.optimize import brentq, minimize, root
 
 from mbref import Scene, equilibria
 from mbref.cli.commands import main
@@ -250,10 +250,30 @@ def test_tackle_in_balance_is_one_indifferent_equilibrium_with_eigenvalues_zero(
     assert each.stability == "indifferent" and not each.eigenvalues.any() and not len(each.frequencies)
 
 
-@pytest.mark.parametrize("turns", [-40, 3, 25])
-def test_spring_wound_by_many_turns_unwinds_to_the_equilibrium_near_its_natural_angle(turns):
+def test_springs_wound_by_many_turns_unwind_to_the_equilibrium_near_their_natural_angles():
+    """Rods of 2 kg and 1 kg on each other: kᵢ (φᵢ - φ₀ᵢ) balances the weights' moments about both hinges. The
+    scene of the equilibrium has the remaining twists φ₀ - φ: a turn more or less is 6.28 rad."""
+    stiffness, natural = np.array([60.0, 40.0]), 2 * np.pi * np.array([-40, 60]) + (0.4, -0.7)
+    chain = rods(np.array([1.0, 0.8]), np.array([2.0, 1.0]), np.array([0.5, 0.5]) * np.pi, [])
+    springs = [
+        spring(k, natural_angle=angle) | {"joint": joint}
+        for k, angle, joint in zip(stiffness.tolist(), natural.tolist(), ("J0", "J1"), strict=True)
+    ]
+    [each] = equilibria(chain.with_(load=springs), starts=1)
+
+    def moments(twists):
+        first, second = np.cumsum(natural - twists)  # angles of the rods from the horizontal
+        lower = 0.4 * G * np.cos(second)
+        return stiffness * twists - (2.0 * G * np.cos(first) + lower, lower)
+
+    assert each.stability == "stable"
+    remaining = [load.natural_angle for load in each.scene.load]
+    assert remaining == pytest.approx(root(moments, np.zeros(2), tol=1e-13).x, abs=CLOSE)
+
+
+def test_spring_wound_by_three_turns_vibrates_about_the_equilibrium_near_its_natural_angle():
     """k (φ - φ₀) = -m g l cos φ near φ₀; the scene of the equilibrium has the remaining twist φ₀ - φ."""
-    stiffness, natural = 60.0, 2 * np.pi * turns + 0.4
+    stiffness, natural = 60.0, 2 * np.pi * 3 + 0.4
     [each] = equilibria(pendulum(load=[spring(stiffness, damping=0.5, natural_angle=natural)]), starts=3)
     angle = brentq(
         lambda a: TORQUE * np.cos(a) + stiffness * (a - natural), natural - 1, natural + 1, xtol=1e-14
