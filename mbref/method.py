@@ -20,6 +20,7 @@ from mbref.integrators.base import Integrator
 from mbref.kernels.layout import Settings
 from mbref.kernels.named_memory import Packed, packed
 from mbref.kernels.records import record
+from mbref.printable import exact
 from mbref.scene.fields import meant
 from mbref.scene.structure import bushings, has_massless, has_parallel_axes, orientations
 from mbref.stabilisation import STABILISATIONS
@@ -230,7 +231,7 @@ class Method:
 
 
 def _text(name: str, options: Mapping[str, float]) -> str:
-    return name + (f"[{','.join(f'{k}={v:g}' for k, v in options.items())}]" if options else "")
+    return name + (f"[{','.join(f'{k}={exact(v)}' for k, v in options.items())}]" if options else "")
 
 
 def _part(text: str, table: Mapping[str, Part], kind: str, options: dict[str, dict[str, float]]) -> Part:

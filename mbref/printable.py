@@ -22,6 +22,12 @@ def shortened(text: str) -> str:
     return LONG_LINE.sub(lambda found: f"{found[0][:2000]} … {found[0][-500:]}", words)
 
 
+def exact(number: float) -> str:
+    """Return a text that reads as this very number: of six digits where they suffice, such as ``5``."""
+    short = f"{number:g}"
+    return short if float(short) == number else repr(float(number))
+
+
 def checked_name(name: str) -> str:
     """Return a name; raises ValueError for a name with a character that is not printed."""
     if found := re.search(f"{ACTING.pattern}|[\t\n]", name):

@@ -11,6 +11,7 @@ import numpy as np
 from mbref.input_error import InputError
 from mbref.method import Method
 from mbref.motions.motion import Motion
+from mbref.printable import exact
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 from mbref.simulation.simulate import Limits, simulate
@@ -73,5 +74,5 @@ def methods_of(method: Method | str, options: Mapping[str, Sequence[float]]) -> 
         changed = base
         for name, value in zip(options, values, strict=True):
             changed = changed.with_option(name, value)
-        found[", ".join(f"{n} = {v:g}" for n, v in zip(options, values, strict=True))] = changed
+        found[", ".join(f"{n} = {exact(v)}" for n, v in zip(options, values, strict=True))] = changed
     return found

@@ -168,6 +168,11 @@ def test_sweep_has_a_motion_for_each_pair_of_gains_with_its_own_gains():
     assert 0.0 < violation["alpha = 50, beta = 50"] < violation["alpha = 0, beta = 0"] / 5
 
 
+def test_sweep_has_a_motion_for_values_that_are_equal_to_six_digits():
+    found = mbref.sweep("point_pendulum", "lm1+none/rk4", {"step": [0.01, 0.0100000001]}, [0.01])
+    assert list(found) == ["step = 0.01", "step = 0.0100000001"]
+
+
 def test_option_of_two_parts_of_a_method_is_varied_by_the_name_of_its_part():
     method = mbref.Method.parse("alf+baumgarte")
     assert str(method.with_option("baumgarte.alpha", 7.0)) == "alf+baumgarte[alpha=7]/dop853"
