@@ -7,12 +7,10 @@ are compared by these displacements instead of accelerations, so that stiff spri
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from mbref import rotations
 from mbref.design.joint_angles import sprung
 from mbref.design.linearisation import EPSILON, OffConstraints, Tangent, norms_by_body
 
@@ -52,6 +50,8 @@ class Newton:
         is_flat = self.stiffness * UNDECIDED / self.sizes <= largest
         placed = PLACED * self.stiffness / self.sizes + np.where(is_flat, largest, 0.0)
         self.bound, self.rounding = BALANCED * pushes + placed, BALANCE_ROUNDING * pushes + placed / 16
+        # directions (f,) along which nothing acts, such as the spin of a rod between ball joints
+        self.is_idle = is_flat & (np.abs(self.parts(self.off)) <= self.bound)
 
     def parts(self, off: np.ndarray) -> np.ndarray:
         """Return the accelerations (f,) along u of x'' (n,)."""
@@ -142,12 +142,14 @@ class Newton:
         return np.asarray(np.abs(self.left.T) @ self.tangent.pushes_of(forces))
 
     def softened(self, y: np.ndarray, forces: np.ndarray) -> np.ndarray:
-        """Return a direction y (f,) with less of each direction that a spring holds.
+        """Return a direction y (f,) with less of each direction that a spring holds, and no idle one if
+        others remain.
 
         Its part is the displacement by forces on the bodies, of sizes (2 nb,), over a stride, at most one.
         """
         free = np.maximum(self._pushes(forces) * self.sizes / STRIDE, self.stiffness.min(initial=np.inf))
         share = np.minimum(1.0, free / np.maximum(self.stiffness, 1e-300))
+        share[self.is_idle & ~self.is_idle.all()] = 0.0
         return np.asarray(self.directions @ (share * (self.directions.T @ y)))
 
     def away(self) -> np.ndarray:
@@ -263,38 +265,3 @@ def _is_equilibrium(tangent: Tangent, near: Newton) -> bool:
     """Return whether nothing accelerates at a pose, by the bounds of an equilibrium."""
     parts = np.abs(tangent.coordinates(tangent.off_balance()))
     return bool((parts <= BALANCED * tangent.pushes + near.bound.max(initial=0.0)).all())
-
-
-def starts_from(first: Tangent, freedoms: int, count: int) -> Iterator[Tangent]:
-    """Yield the first pose, and further poses along the constraints in random directions with a fixed seed.
-
-    Starts displace soft springs rather than stiff ones.
-    """
-    rng = np.random.default_rng(1)
-    yield first
-    ends = [first, first]
-    directions: list[np.ndarray | None] = [None, None]
-    for k in range(1, count):
-        side = (k + 1) % 2
-        tangent, old = ends[side], directions[side]
-        drawn = rng.standard_normal(tangent.model.n)
-        wish = drawn if old is None else old + 0.3 * rotations.unit(drawn)
-        if old is None and side and directions[0] is not None:
-            wish = -directions[0]
-        direction, moved = _stride(tangent, tangent.basis.T @ wish, first.forces)
-        if moved is None or moved.freedoms != freedoms:
-            directions[side] = None
-            continue
-        directions[side], ends[side] = direction, moved
-        yield moved
-
-
-def _stride(tangent: Tangent, y: np.ndarray, forces: np.ndarray) -> tuple[np.ndarray, Tangent | None]:
-    """Return a direction (n,) of unit length near y (f,) that displaces soft springs, and the pose after a
-    stride along it."""
-    here: Newton | Tangent = tangent
-    with contextlib.suppress(OffConstraints):
-        here = Newton(tangent)
-        y = here.softened(y, forces)
-    y = y / (np.linalg.norm(tangent.basis @ y) or 1.0)
-    return rotations.unit(tangent.basis @ y), here.moved(STRIDE * y)

@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from mbref import rotations
-from mbref.design.balance import ONE_POSE, Newton, are_one, balanced, starts_from
+from mbref.design.balance import ONE_POSE, Newton, are_one, balanced
 from mbref.design.falling import fallen
 from mbref.design.joint_angles import slots
 from mbref.design.linearisation import Tangent, multipliers, unsteady
 from mbref.design.stability import eigenvalues_of, linear_at
+from mbref.design.starts import starts_from
 from mbref.design.turning import Turning, turning
 from mbref.design.winding import wound
 from mbref.design.windings import Windings
