@@ -17,6 +17,8 @@ import threading
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from mbref.command_line import INTERRUPTED
+
 
 def run_program(module: str, options: Sequence[str]) -> int:
     """Run a module as a program and return its exit status, negative if a signal ended it.
@@ -50,7 +52,10 @@ def main() -> None:
         os.dup2(nothing.fileno(), 0)
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     sys.argv[:] = sys.argv[1:]
-    runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
+    try:
+        runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
+    except KeyboardInterrupt:  # while it was imported
+        sys.exit(INTERRUPTED)
 
 
 def _end_with(parent: int) -> None:

@@ -91,7 +91,7 @@ class Compared:
         half, digits = float(self.rounding[name].max()), self.digits.get(name, WHOLE)
         extent = float(np.ptp(self.exact[name]))
         rounded = digits if half > max(SHARE * extent, FINE * self.scale[name]) else None
-        coarse = half > COARSEST * max(extent, self.scale[name])
+        coarse = bool(half > COARSEST * max(extent, self.scale[name]))
         if not off.any():
             return ColumnError(
                 name,

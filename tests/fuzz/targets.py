@@ -18,7 +18,7 @@ from mbref.scene import Scene, SceneError
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, prepare, simulate
 from tests.fuzz import mutations
-from tests.fuzz.command_lines import command_line
+from tests.fuzz.command_lines import command_line, commands
 
 LONG = 10.0  # s after which a case is interrupted
 PATIENCE = {"command_line": 3.0}  # s; measuring commands would take hours
@@ -80,7 +80,8 @@ TARGETS = {f.__name__: f for f in (scene_file, scene_data, simulation, command_l
 
 
 def compile_all() -> None:
-    """Compile what the cases need, so that none is interrupted in that."""
+    """Compile and import what the cases need, so that none is interrupted in that."""
+    commands()
     for name in dict.fromkeys(mutations.METHODS):
         prepare(Method.parse(name))
     diagnose(SCENES["four_bar"]())
