@@ -112,7 +112,8 @@ def aligned(compared: Compared, half: np.ndarray, later: Mapping[str, Callable[.
     """Return the comparison at times within the rounding ``half`` (k,) of the written times.
 
     Evenly spaced times count as exact. Other times are moved one by one. All columns of a sample are compared
-    at one time. The sum of the parts of errors that exceed their bounds, relative to the bounds, is least.
+    at one time. The sum of the parts of errors that exceed their bounds, relative to the bounds, is least; a
+    cell that is off at every time within the rounding does not count, unless all cells of its row are.
     The motion near a sample is a parabola, by the derivatives of the splines ``later``.
     """
     times, names = compared.times, list(compared.recorded)
@@ -127,8 +128,12 @@ def aligned(compared: Compared, half: np.ndarray, later: Mapping[str, Callable[.
     def moved(shift: np.ndarray) -> np.ndarray:
         return rate * shift + curve * shift**2 / 2
 
+    nearest = np.clip(np.divide(left, rate, out=np.zeros_like(left), where=rate != 0.0), low, high)
+    can_be_right = np.abs(left - moved(nearest)) <= bound
+    counts = can_be_right | ~can_be_right.any(axis=0)
+
     def excess(shift: np.ndarray) -> np.ndarray:
-        size = np.abs(left - moved(shift)) / bound
+        size = counts * np.abs(left - moved(shift)) / bound
         return np.asarray(np.maximum(size - CLOSE, 0.0).sum(axis=0) + INNER * (size**2).mean(axis=0))
 
     shift = np.zeros_like(high)
@@ -142,6 +147,7 @@ def aligned(compared: Compared, half: np.ndarray, later: Mapping[str, Callable[.
     free = dict(zip(names, np.abs(rate) * half, strict=True))
     return replace(
         compared,
+        times=times + shift,
         exact={n: compared.exact[n] + change[n] for n in names},
         rounding={n: np.maximum(compared.rounding[n], free[n]) for n in names},
     )

@@ -78,6 +78,6 @@ def _difference(
         compared.scale,
         later,
         end=end,
-        allowed={n: compared.allowed(n)[rows] for n in recorded},
+        allowed={n: np.maximum(compared.allowed(n), compared.rounding[n])[rows] for n in recorded},
         every=(compared.times, compared.exact),
     )
