@@ -1,7 +1,21 @@
-"""Rows, redundant rows and degrees of freedom by the judge / scenes worked out by hand."""
+"""Rows, redundant rows and degrees of freedom / mbref's counts, and scenes worked out by hand."""
 
+import pytest
+
+import mbref
 from crosscheck.judge.mobility import mobility
 from mbref.scene import GROUND, Body, Distance, Revolute, Scene
+from tests.helpers.coupled_mechanisms import coupled_loops, gear_pair, pendulum, screw
+
+
+@pytest.mark.parametrize("make", [gear_pair, screw, pendulum, coupled_loops])
+def test_coupling_is_a_constraint_row_and_an_armature_is_none(make):
+    """The judge's count is mbref's without rotors, which are hidden bodies of six coordinates and rows."""
+    scene = make()
+    counts, found = mbref.counts(scene), mobility(scene)
+    rotors = sum(bool(joint.armature) for joint in scene.joint if hasattr(joint, "armature"))
+    assert found.degrees_of_freedom == counts.degrees_of_freedom and found.redundant == counts.redundant
+    assert found.rows == counts.rows - 6 * rotors
 
 
 def test_mobility_of_four_small_scenes_is_as_counted_by_hand():

@@ -2,13 +2,17 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import mbref
 from crosscheck.conformance.changes.units import in_other_units
 from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.judge.mobility import mobility
+from crosscheck.judge.truth import closed_form
 from mbref import Scene, diagnose, exchanges, find_scene
 from mbref.cli.commands import main
+from mbref.scenes.four_bar import four_bar_gravity
 from tests.helpers.statics import ball_linkage, hinge, parallelogram, rod
 
 SIZES = (1e-6, 1e-3, 1e3, 1e6)
@@ -64,6 +68,18 @@ def printed(scene: Scene, folder: Path, capsys: pytest.CaptureFixture[str]) -> s
     scene.save(folder / "scene.toml")
     assert main(["diagnose", str(folder / "scene.toml"), "--start"]) == 0
     return " ".join(capsys.readouterr().out.split())
+
+
+def test_diagnosis_lists_the_three_crossings_of_a_swinging_rhombus():
+    """Its links hang: released at θ = 0.3 rad they swing through 0 and -π, turn at -π - 0.3 rad and pass -π
+    again within 1 s. The crank of the closed form is level, y = 0, at these times."""
+    scene = four_bar_gravity(0.3)
+    crossings, exact = mbref.along_motion(scene).crossings, closed_form(scene)
+    assert [each.sentence for each in crossings] == ["2 branches"] * 3
+    height = exact.poses(np.linspace(0.0, 1.0, 201)).position[:, 0, 1]  # m, of the crank
+    assert np.count_nonzero(np.diff(np.sign(height))) == 3
+    level = exact.poses([each.time for each in crossings]).position[:, 0, 1]
+    assert np.abs(level).max() < 1e-9  # m; rtol of the motion
 
 
 def test_each_exchange_of_a_hinge_ends_the_redundancy_and_keeps_the_freedom_by_the_judge():
