@@ -141,7 +141,7 @@ def test_scene_file_that_is_broken_too_deep_too_long_or_no_text_is_refused(text,
 
 
 def test_missing_scene_file_is_refused_as_unreadable(tmp_path):
-    with pytest.raises(SceneError, match="cannot be read"):
+    with pytest.raises(SceneError, match=r"missing\.toml: cannot be read: No such file"):
         Scene.from_file(tmp_path / "missing.toml")
 
 

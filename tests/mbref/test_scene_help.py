@@ -357,7 +357,8 @@ def test_command_run_writes_json_and_csv_and_prints_at_most_80_characters_a_line
 
 def test_command_run_refuses_a_file_with_another_ending(tmp_path, capsys):
     assert main([*RUN, "--out", str(tmp_path / "run.txt")]) == 2
-    assert "run.txt" in capsys.readouterr().err and not list(tmp_path.iterdir())
+    said = f"--out: must end in .csv or .json, got '{tmp_path / 'run.txt'}'\n"
+    assert capsys.readouterr().err == said and not list(tmp_path.iterdir())
 
 
 def test_command_animate_writes_an_svg_of_its_scenes_name(tmp_path, monkeypatch):

@@ -154,7 +154,7 @@ def test_links_of_readme_and_docs_to_files_lead_to_files():
     """Links to figures are left out: docs/hooks.py draws them."""
     for path in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md")):
         links = re.findall(r"\]\(([^)#:]+)\)", path.read_text())
-        there = [link for link in links if "figures/" not in link]  # made by docs/hooks.py
+        there = [link for link in links if "figures/" not in link]
         missing = [link for link in there if not (path.parent / link).exists()]
         assert not missing, f"{path.name} links to {missing}"
 

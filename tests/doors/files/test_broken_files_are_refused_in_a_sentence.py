@@ -146,7 +146,7 @@ def test_models_that_include_each_other_400_deep_are_refused(files):
             f"<sdf version='1.9'><model name='m{k}'>{include}<link name='l'/></model></sdf>"
         )
     text = "<sdf version='1.9'><model name='m'><include><uri>m0.sdf</uri></include></model></sdf>"
-    assert "nested more than" in files.refusal(text, "m.sdf")
+    assert "models are nested more than 200 deep" in files.refusal(text, "m.sdf")
 
 
 @pytest.mark.parametrize("version", ["abc", "", "1.x", "1..6"])

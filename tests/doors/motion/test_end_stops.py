@@ -127,17 +127,21 @@ def test_judge_finds_the_events_by_itself(scene, formulation):
     assert np.abs(doubles(found.velocity) - motion.velocity).max() <= 1e-12
 
 
-def test_stops_are_named_where_they_are_wrong_or_not_supported():
-    faults = {
-        "coordinate starts, got 0.1": {"lower": 0.1},
-        "upper: or lower is required": {"restitution": 0.5},
-        "restitution: must be at most 1.0, got 2": {"lower": -1.0, "restitution": 2.0},
-        "is of the displacement of a translational joint, got '3 deg'": {"upper": "3 deg"},
-    }
-    for message, stop in faults.items():
-        with pytest.raises(SceneError) as fault:
-            ball(0.5, 1.0).with_(joint=[slide("S", "ground", "ball", ORIGIN, Z, stop=stop)])
-        assert message in str(fault.value)
+@pytest.mark.parametrize(
+    ("stop", "says"),
+    [
+        ({"lower": 0.1}, "coordinate starts, got 0.1"),
+        ({"restitution": 0.5}, "upper: or lower is required"),
+        ({"lower": -1.0, "restitution": 2.0}, "restitution: must be at most 1.0, got 2"),
+        ({"upper": "3 deg"}, "is of the displacement of a translational joint, got '3 deg'"),
+    ],
+)
+def test_fault_of_a_stop_is_named(stop, says):
+    with pytest.raises(SceneError, match=says):
+        ball(0.5, 1.0).with_(joint=[slide("S", "ground", "ball", ORIGIN, Z, stop=stop)])
+
+
+def test_stop_is_refused_at_a_driven_joint_in_a_diagnosis_and_by_an_engine_without_stops():
     with pytest.raises(SceneError, match="needs a joint without a driver"):
         door().with_(driver=[{"joint": "A", "polynomial": [0.0, 1.0]}])
     with pytest.raises(SceneError, match=r"joint\[A\]\.stop: only motions have intervals and stops"):
