@@ -12,6 +12,7 @@ from mbref.simulation import VERSION
 
 if TYPE_CHECKING:
     from mbref.design.along_motion import AlongMotion, along_motion
+    from mbref.design.derivatives.at_rest import equilibrium_sensitivities
     from mbref.design.derivatives.fit import FitResult, fit
     from mbref.design.derivatives.result import Sensitivities
     from mbref.design.derivatives.sensitivities import sensitivities
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 __version__ = VERSION
 
 _PUBLIC = {  # module → its public names
+    "design.derivatives.at_rest": ("equilibrium_sensitivities",),
     "design.derivatives.fit": ("FitResult", "fit"),
     "design.derivatives.result": ("Sensitivities",),
     "design.derivatives.sensitivities": ("sensitivities",),
@@ -97,6 +99,7 @@ __all__ = [
     "diagnose",
     "ensemble",
     "equilibria",
+    "equilibrium_sensitivities",
     "exchanges",
     "find_scene",
     "fit",

@@ -74,7 +74,7 @@ class Columns:
     """Columns (k, columns) of a motion as a function of its states."""
 
     def __init__(self, motion: Motion, names: Sequence[str], step: float):
-        self.motion, self.names, self.step = motion, names, step
+        self.motion, self.names, self.step = motion, [*names], step
         self._has_reactions = any(quantity_of(name) in FORCES for name in names)
 
     def at(self, scene: Scene, model: Model, states: States) -> np.ndarray:

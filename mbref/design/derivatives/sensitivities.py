@@ -82,14 +82,14 @@ def sensitivities(
         If an output has no derivative, if the motion does not depend smoothly on a number, if a number moves
         the time of a switch or opens a loop, or if constraints have intervals or end stops.
     """
-    request = _Request(find_scene(scene), of, to, times)
+    request = DerivativeRequest(find_scene(scene), of, to, times)
     limits = limits or Limits(rtol=RTOL)
     first = request.solved(request.method, limits, FIRST_PRECISION)
     finer = replace(limits, rtol=max(FINEST, FINER * limits.rtol), atol=None)
     by = Method.parse(f"{SERIES_METHOD}[order={ORDER}]") if request.method.is_series else request.method
     second = request.solved(by, finer, SECOND_PRECISION)
     request.release()
-    return _compared(first, second, request)
+    return compared(first, second, request)
 
 
 def motion_and_derivatives(
@@ -97,10 +97,11 @@ def motion_and_derivatives(
 ) -> tuple[Motion, list[str], np.ndarray]:
     """Return the motion at times (k,), s, the outputs' names, and their derivatives (k, outputs, numbers) up
     to a singular position, without an estimate of their errors. Raises the errors of ``sensitivities``."""
-    request = _Request(scene, of, to, times)
+    request = DerivativeRequest(scene, of, to, times)
     found = request.solved(request.method, limits, FIRST_PRECISION)
     request.release()
-    return found.run.motion, found.outputs, found.values
+    assert request.motion is not None
+    return request.motion, found.outputs, found.values
 
 
 def _refuse(scene: Scene, of: Sequence[str], to: Sequence[str]) -> None:
@@ -112,17 +113,17 @@ def _refuse(scene: Scene, of: Sequence[str], to: Sequence[str]) -> None:
             raise InputError(f"{name}: needs a list of one name at least")
 
 
-class _Solved(NamedTuple):
-    """Names of the outputs, derivatives (k, outputs, numbers) at the samples reached of a run, and the
-    rounding of their differences."""
+class Derivatives(NamedTuple):
+    """Time (s) of the first singular position, names of the outputs, derivatives (k, outputs, numbers) at the
+    samples reached of a run, and the rounding of their differences."""
 
-    run: Followed
+    undecided_from: float
     outputs: list[str]
     values: np.ndarray
     rounding: np.ndarray
 
 
-class _Request:
+class DerivativeRequest:
     """A scene's motion at samples (k,), s, its outputs, and the numbers by which it is differentiated."""
 
     def __init__(
@@ -152,7 +153,7 @@ class _Request:
         for each in (self.model, *(variant for number in self.of_scene for variant in number.models)):
             each.release()
 
-    def solved(self, method: Method, limits: Limits, precision: Precision) -> _Solved:
+    def solved(self, method: Method, limits: Limits, precision: Precision) -> Derivatives:
         """Return the derivatives of the outputs along a run by a method."""
         model, step = self.model, precision.step
         run = Followed.of(self.scene, model, method, limits, self.samples, gauss(precision.points))
@@ -172,7 +173,7 @@ class _Request:
         values, rounding = np.stack([by_label[label] for label in self.labels], axis=-1)
         self.motion = self.motion or motion
         signs = self._signs(names, found.states)[..., None]
-        return _Solved(run, names, signs * values, rounding)
+        return Derivatives(run.undecided_from, names, signs * values, rounding)
 
     def _signs(self, names: Sequence[str], states: States) -> np.ndarray:
         """Return -1 for columns (k, outputs) of quaternions that have the other sign in the first motion."""
@@ -194,7 +195,7 @@ class _Request:
         return np.asarray(share * np.abs(values).max(axis=0, initial=0.0, keepdims=True))
 
 
-def _compared(first: _Solved, second: _Solved, request: _Request) -> Sensitivities:
+def compared(first: Derivatives, second: Derivatives, request: DerivativeRequest) -> Sensitivities:
     """Return the more accurate derivatives, with the difference of both as their error."""
     count, samples = min(len(first.values), len(second.values)), request.samples
     values = np.full((samples.size, *second.values.shape[1:]), np.nan)
@@ -202,7 +203,8 @@ def _compared(first: _Solved, second: _Solved, request: _Request) -> Sensitiviti
     values[:count] = second.values[:count]
     difference = np.abs(first.values[:count] - values[:count])
     errors[:count] = difference + second.rounding[:count] + request.errors(values[:count])
-    motion, t = first.run.motion, min(first.run.undecided_from, second.run.undecided_from)
+    motion, t = request.motion, min(first.undecided_from, second.undecided_from)
+    assert motion is not None
     outcome, message = motion.outcome, motion.message
     if count < motion.times.size:
         outcome = Outcome.UNDECIDED

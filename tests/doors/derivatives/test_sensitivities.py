@@ -132,6 +132,23 @@ def test_derivative_of_a_conserved_energy_stays_the_one_at_the_start():
     np.testing.assert_allclose(found.get("energy", "gravity.y"), true, rtol=ACCURATE)
 
 
+def test_equilibrium_of_a_pendulum_with_a_torsion_spring_moves_as_in_closed_form():
+    """k φ = m g l cos φ with k = 10 N m/rad, m = 1.3 kg, l = 0.5 m: dφ/dk = -φ/(k + m g l sin φ)."""
+    bob, spring = (
+        body("bob", 1.3, [0.05, 0.06, 0.07], (0.5, 0.0, 0.0)),
+        {"type": "torsion_spring", "joint": "A"},
+    )
+    scene = pendulum().with_(body=[bob], load=[{**spring, "stiffness": 10.0}])
+    rest = mbref.equilibria(scene)[0].scene
+    moment, angle = 1.3 * GRAVITY, -np.arctan2(rest.body[0].position[1], rest.body[0].position[0])
+    found = mbref.equilibrium_sensitivities(
+        rest, ["A.angle", "A.force.y"], ["load[0].stiffness", "gravity.y"]
+    )
+    slope = 10.0 + 0.5 * moment * np.sin(angle)
+    true = [[angle / slope, 0.5 * 1.3 * np.cos(angle) / slope], [0.0, -1.3]]
+    assert_close(found.values[0], np.array(true))
+
+
 @pytest.mark.slow
 def test_derivative_in_other_units_is_scaled_by_the_units_of_output_and_number():
     mass, length, time = 8.0, 0.5, 0.25
