@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from mbref.scene.fields import SceneEntry, Time, as_list
 
+EVEN_ROUNDING = 1e-15  # difference of times / time, by rounding of evenly spaced samples: a few units
 Engagement = Literal["anywhere", "given_pose"]
 
 
@@ -41,3 +44,16 @@ class Intermittent(SceneEntry):
     def is_active(self, t: float) -> bool:
         """Return whether the constraint holds from t (s) on."""
         return self.active is None or any(begin <= t < end for begin, end in self.active)
+
+
+def samples_at(times: np.ndarray, events: Sequence[float]) -> np.ndarray:
+    """Return sample times (k,), s, of which one that differs from an event's time by rounding is that time.
+
+    ``np.linspace(0, 0.3, 4)`` has a sample one unit of rounding before 0.1 s.
+    """
+    found = times.copy()
+    for event in set(events) - set(times.tolist()):
+        nearest = int(np.abs(times - event).argmin())
+        if abs(times[nearest] - event) <= EVEN_ROUNDING * event:
+            found[nearest] = event
+    return found

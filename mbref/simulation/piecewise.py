@@ -18,6 +18,7 @@ from mbref.motions.pieces import cannot_hold, changes, event_times, first_piece,
 from mbref.motions.trajectory import PER_BODY, Cost, Outcome, Trajectory
 from mbref.scene import Joint, Scene, SceneError
 from mbref.scene.bodies import DRIVER
+from mbref.scene.intervals import samples_at
 from mbref.simulation.end_stops import EndStops, with_impact
 from mbref.stepping.limits import Limits
 from mbref.stepping.run import missing_masses
@@ -48,6 +49,7 @@ def simulate_pieces(
         raise InputError("branches: cannot be chosen in a scene whose joints or couplings have intervals")
     if not scene.has_mass():
         raise SceneError(missing_masses(scene))
+    times = samples_at(times, event_times(scene, np.inf))
     stops = EndStops(scene, lambda scene, times: run(scene, times, None), float(times[-1]))
     begin, ends = 0.0, event_times(scene, float(times[-1]))
     piece, pieces, events, turned = first_piece(scene), [], [], dict[str, float]()

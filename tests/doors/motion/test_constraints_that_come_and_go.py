@@ -51,6 +51,13 @@ def test_events_and_columns_state_when_a_latch_holds_and_its_impulse():
     assert motion.columns("L.impulse.x")["L.impulse.x"].tolist() == pytest.approx([0, 0, 2.25, 2.25, 2.25])
 
 
+def test_evenly_spaced_sample_that_rounding_puts_before_an_event_has_the_state_after_it():
+    """The second of four samples up to 0.3 s is one unit of rounding before 0.1 s, where the carts latch."""
+    motion = mbref.simulate(carts(), times=np.linspace(0.0, 0.3, 4))
+    assert motion.velocity[1, :, 0].tolist() == pytest.approx([-0.25, -0.25], abs=ROUNDING)
+    assert motion.joint("L").active.tolist() == [0, 1, 1, 0]
+
+
 def test_rod_that_its_pivot_releases_flies_along_a_straight_line():
     """Without gravity, from the angle ω t with the velocity ω r, and turns on."""
     spin, until, times = 5.0, 0.3, np.array([0.3, 0.5, 1.0])
