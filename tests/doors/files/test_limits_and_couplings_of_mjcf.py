@@ -58,13 +58,15 @@ COUPLED = """<mujoco><compiler angle="radian"/><worldbody>
 <body name="d" pos="3 0 0"><joint name="jd" type="ball" armature="0.3" stiffness="2" damping="0.5"/>
 <geom size=".1" mass="1" pos=".3 0 0"/></body>
 </worldbody><equality><joint name="line" joint1="jb" joint2="ja" polycoef="0 -3 0 0 0"/>
-<joint name="curve" joint1="jc" joint2="ja" polycoef="0 1 2 0 0"/></equality></mujoco>"""
+<tendon name="curve" tendon1="tc" tendon2="ta" polycoef="0 1 2 0 0"/></equality>
+<tendon><fixed name="tc"><joint joint="jc" coef="1"/></fixed>
+<fixed name="ta"><joint joint="ja" coef="1"/></fixed></tendon></mujoco>"""
 
 
 @pytest.mark.parametrize("kinds", ["couplings,armature,springs,damping", "everything"])
 def test_without_leaves_out_and_names_only_parts_that_a_scene_cannot_have(files, kinds):
-    """A scene has linear couplings and armatures of hinges: the quadratic one and parts of a ball joint are
-    left out."""
+    """A scene has couplings of joints and armatures of hinges: a quadratic one of tendons and parts of a ball
+    joint are left out."""
     said = files.refusal(COUPLED, "a.xml", "--without", "couplings,armature")
     assert "stiffness of joint 'jd'" in said and "damping of joint 'jd'" in said
     scene, out = files.scene(COUPLED, "a.xml", "--without", kinds)
