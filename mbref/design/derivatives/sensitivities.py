@@ -36,9 +36,7 @@ FIRST_PRECISION, SECOND_PRECISION = Precision(12, 0.02), Precision(16, 0.01)
 RTOL = 1e-12  # default relative tolerance of the runs
 FINER = 0.1  # tolerance of the more accurate run / tolerance
 ORDER = 24  # order of the series of the more accurate run
-DIFFERENCE_ROUNDING = (
-    2e-14  # error of a difference of order 8 / largest value of the derivative over the samples
-)
+DIFFERENCE_ROUNDING = 2e-14  # error of a difference of order 8 / largest derivative over the samples
 MOST_ROWS = 400  # constraint rows, whose singular values are computed at every point
 
 

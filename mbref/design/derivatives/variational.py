@@ -52,7 +52,10 @@ class VariationalEquations:
             x, v = (np.array([start[k] / units for start in starts]).reshape(count, -1) for k in range(2))
             at_start = (run.chosen if panels else chosen)[0]
             first = np.concatenate([x[:, at_start], v[:, at_start]], axis=1).T
-            self._integrate(first, place, y) if panels else y.__setitem__(slice(None), first)
+            if panels:
+                self._integrate(first, place, y)
+            else:
+                y[:] = first
         states, parts = [], []
         for part, own, found in self._tangents(run.states, chosen):
             states.append(own)
@@ -72,9 +75,8 @@ class VariationalEquations:
         count = self.run.states.times.size
         if not count or not self.freedoms:
             return np.zeros((count, self.freedoms), dtype=int)
-        return independent_displacements(TangentRows(self.model, self.run.states.at(slice(0, 1))).free[0])[
-            None
-        ]
+        free = TangentRows(self.model, self.run.first).free[0]
+        return independent_displacements(free)[None]
 
     def _total(self, found: Tangents, y: np.ndarray) -> list[np.ndarray]:
         """Return changes x, v, a, λ (k, ·, starts) for y (k, 2 f, starts), with the numbers' own parts."""

@@ -61,7 +61,7 @@ def test_derivatives_of_a_pendulums_angle_equal_those_of_jacobis_function():
         assert_close(found.values[:, 0, k], true)
 
 
-SLIDER = slide("D", "ground", "last", (0.9, 0.5, 0.0), (1.0, 0.0, 0.0))
+SLIDER = slide("D", "ground", "last", (0.9, 0.5, 0.0))
 ROCKER = hinge("D", "ground", "last", (1.0, 0.0, 0.0))
 
 
@@ -105,7 +105,7 @@ def position_of_rocker(times, bx, by, cx, cy):
 )
 def test_positions_of_a_driven_linkage_depend_on_pins_as_in_closed_form_and_not_on_masses(last, output, form):
     """The linkages have redundant rows; no driver's motion depends on a mass."""
-    times = np.array([0.2, 0.5, 0.9])
+    times = np.array([0.2, 0.9])
     numbers = {"bx": 0.2, "by": 0.1, "cx": 0.9, "cy": 0.5}
     paths = ["joint[B].anchor.x", "joint[B].anchor.y", "joint[C].anchor.x", "joint[C].anchor.y"]
     found = mbref.sensitivities(crank_linkage(last), [output], [*paths, "body[last].mass"], times)
@@ -139,7 +139,7 @@ def test_equilibrium_of_a_pendulum_with_a_torsion_spring_moves_as_in_closed_form
         {"type": "torsion_spring", "joint": "A"},
     )
     scene = pendulum().with_(body=[bob], load=[{**spring, "stiffness": 10.0}])
-    rest = mbref.equilibria(scene)[0].scene
+    rest = mbref.equilibria(scene, starts=1)[0].scene
     moment, angle = 1.3 * GRAVITY, -np.arctan2(rest.body[0].position[1], rest.body[0].position[0])
     found = mbref.equilibrium_sensitivities(
         rest, ["A.angle", "A.force.y"], ["load[0].stiffness", "gravity.y"]
