@@ -52,13 +52,14 @@ def in_other_units(scene: Scene, length: float, time: float) -> Scene:
     loads = {**places, **moments, "force": times(push), "factor": lambda factor: _slower(factor, 1.0, time)}
     linear = {"stiffness": times(1 / time**2), "damping": times(1 / time)}
     turning = {"stiffness": times(length * push), "damping": times(length * speed)}
+    sliding = {**places, "stop": lambda stop: mapped(stop, dict.fromkeys(("lower", "upper"), times(length)))}
     slides = {joint.name for joint in scene.joint if joint.facts.driven == "displacement"}
     return scene.with_(
         gravity=times(push)(scene.gravity).tolist(),
         duration=scene.duration * time,
         body=tuple(mapped(body, bodies) for body in scene.body),
         joint=tuple(
-            mapped(joint, places if joint.name in slides else {**places, "armature": times(length**2)})
+            mapped(joint, sliding if joint.name in slides else {**places, "armature": times(length**2)})
             for joint in scene.joint
         ),
         coupling=tuple(_coupled_in_lengths(scene, coupling, length) for coupling in scene.coupling),

@@ -226,7 +226,11 @@ class Imported(Loaded):
         turns = np.array([rotations.from_matrix(place.turn) for place in places])
         twists = (self._columns(posed) @ v).reshape(-1, 6)
         # the start obeys the couplings, whose coordinates count from it
-        obeyed = [coupling.model_copy(update={"offset": 0.0}) for coupling in scene.coupling]
+        led = [scene.coupled(coupling)[0] for coupling in scene.coupling]
+        obeyed = [
+            coupling.from_pose(values.get((kind, joint.name), 0.0)).model_copy(update={"offset": 0.0})
+            for coupling, (joint, kind) in zip(scene.coupling, led, strict=True)
+        ]
         scene = scene.with_(gravity=tuple(gravity), coupling=obeyed)
         begun = restarted(scene, positions, turns, twists, values)
         from crosscheck.engines.mbref import ENGINE
