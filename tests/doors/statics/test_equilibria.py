@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq, minimize, root
+from scipy.optimize import minimize, root
 
 from mbref import Scene, equilibria
 from mbref.cli.commands import main
@@ -269,20 +269,6 @@ def test_springs_wound_by_many_turns_unwind_to_the_equilibrium_near_their_natura
     assert each.stability == "stable"
     remaining = [load.natural_angle for load in each.scene.load]
     assert remaining == pytest.approx(root(moments, np.zeros(2), tol=1e-13).x, abs=CLOSE)
-
-
-def test_spring_wound_by_three_turns_vibrates_about_the_equilibrium_near_its_natural_angle():
-    """k (φ - φ₀) = -m g l cos φ near φ₀; the scene of the equilibrium has the remaining twist φ₀ - φ."""
-    stiffness, natural = 60.0, 2 * np.pi * 3 + 0.4
-    [each] = equilibria(pendulum(load=[spring(stiffness, damping=0.5, natural_angle=natural)]), starts=3)
-    angle = brentq(
-        lambda a: TORQUE * np.cos(a) + stiffness * (a - natural), natural - 1, natural + 1, xtol=1e-14
-    )
-    place = each.scene.body[0].position
-    assert np.allclose(place[:2], (ARM * np.cos(angle), ARM * np.sin(angle)), atol=CLOSE)
-    assert each.scene.load[0].natural_angle == pytest.approx(natural - angle, abs=CLOSE)
-    squares = (stiffness - TORQUE * np.sin(angle)) / ABOUT_HINGE
-    assert np.allclose(np.abs(each.eigenvalues) ** 2, squares, rtol=1e-8) and each.stability == "stable"
 
 
 @pytest.mark.parametrize(
