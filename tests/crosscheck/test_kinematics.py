@@ -54,16 +54,6 @@ def moved(motion, rates, h):
     return position + h * velocity + h**2 / 2 * rates[0], later, velocity + h * rates[0], spin + h * rates[1]
 
 
-@pytest.mark.parametrize("bodies", [PAIR, ("second", "first"), ("ground", "first"), ("second", "ground")])
-@pytest.mark.parametrize("kind", ROWS)
-def test_joint_has_its_number_of_rows_and_no_residual_at_the_start(kind, bodies):
-    """ROWS has 6 minus the joint's freedoms; the residual at the scene's own poses is rounding."""
-    scene = jointed(kind, bodies)
-    residual = constraints.closure(scene, 0.0, *constraints.initial_poses(scene))["j"]
-    assert residual.shape == (ROWS[kind],), f"{kind}: {residual.shape} rows, expected {ROWS[kind]}"
-    assert np.abs(residual).max() < ROUNDED, f"{kind}: residual {residual} at t = 0, of lengths up to 1.4 m"
-
-
 DRIVERS = {
     "revolute": Driver(joint="j", polynomial=(0.0, 1.3, -0.7), sine=Sine(amplitude=0.4, frequency=2.0)),
     "cylindrical": Driver(joint="j", polynomial=(0.0, -2.1)),

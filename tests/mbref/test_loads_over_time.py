@@ -47,13 +47,6 @@ def test_equilibrium_of_a_load_over_time_is_refused():
         mbref.equilibria(scenes.wheel())
 
 
-def test_equilibrium_of_a_sprung_slide_has_its_frequency_and_a_relaxed_spring():
-    """ω = √(k / m) with k = 50 N/m and m = 2 kg; the spring's displacement counts from the new pose."""
-    found = mbref.equilibria(scenes.sprung_slide())
-    assert [load.natural_displacement for load in found[0].scene.load] == [pytest.approx(0.0, abs=1e-9)]  # m
-    assert found[0].frequencies[0] == pytest.approx(np.sqrt(50.0 / 2.0) / 2 / np.pi)
-
-
 FAULTS = {
     "must have at least 4 rows": {"table": [[0.0, 0.0], [1.0, 1.0], [3.0, 2.0]]},
     "row 2 is at 0.5 s and row 1 at 1 s": {"table": [[0.0, 0.0], [1.0, 1.0], [0.5, 2.0], [3.0, 2.0]]},

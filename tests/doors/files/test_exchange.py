@@ -21,7 +21,7 @@ from tests.crosscheck.measured import MARGIN
 
 ALIKE = 6.1e-10  # measured difference of accelerations / the largest acceleration
 
-MODELS = Path(__file__).parent / "models"
+MODELS = Path(__file__).parents[2] / "crosscheck" / "models"
 NAMES = ("four_bar", "five_bar", "delta_leg", "stewart_legs", "slider_crank", "scissor")
 EXPORTED = ("four_bar_gravity", "bennett", "andrews_squeezer", "flyball_governor", "sarrus")
 
