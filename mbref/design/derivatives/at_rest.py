@@ -86,7 +86,8 @@ def equilibrium_sensitivities(
 
 def _solved(request: DerivativeRequest, motion: Motion, precision: Precision) -> Derivatives:
     """Return the derivatives (1, outputs, numbers) at the equilibrium, and the rounding of differences."""
-    model, numbers, step = request.model, request.of_scene, precision.step
+    model, step = request.model, precision.step
+    numbers = request.differentiate(step)
     start = consistent_start(model)
     if start.v.any():
         raise InputError(f"{request.scene.name}: is not at rest; {FIND_EQUILIBRIUM}")

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from mbref.design.derivatives.states import shortest_spring
 from mbref.design.differences import Stencil, central, one_sided
 from mbref.equations.initial_state import consistent_start
 from mbref.equations.model import Model, displacement
@@ -38,7 +39,7 @@ UNITS = {  # by field
 }
 UNITS_OF_TURNS = {"stiffness": "N m/rad", "damping": "N m s/rad", "armature": "kg m²"}
 UNITS_OF_SLIDES = {"stiffness": "N/m", "damping": "N s/m", "armature": "kg"}
-STEPS = tuple(0.05 / 4**k for k in range(6))  # increments / size of the number, the first ones preferred
+REDUCED = tuple(4.0**-k for k in range(6))  # factors on the step, the first ones preferred
 ACCURATE = 1e-12  # relative error of a derivative of the scene's arrays from which no smaller step is tried
 ROUGH = 1e-6  # relative error above which the arrays are not smooth in the number
 EPSILON = float(np.finfo(float).eps)
@@ -67,18 +68,19 @@ class SceneNumber:
         return np.asarray(sum(parts))
 
 
-def scene_number(scene: Scene, label: str, base: Model) -> SceneNumber:
+def scene_number(scene: Scene, label: str, base: Model, step: float) -> SceneNumber:
     """Return the number of a scene at a path such as ``body[rod].mass`` or ``joint[B].anchor.x``.
 
-    ``base`` is the model of the assembled scene. Raises SceneError if the path has no number, or if no value
-    near it makes a valid scene; InputError if the equations do not depend on it smoothly.
+    ``base`` is the model of the assembled scene, ``step`` the increment over the number's size. Raises
+    SceneError if the path has no number, or if no value near it makes a valid scene; InputError if the
+    equations do not depend on it smoothly.
     """
     found: list[SceneNumber] = []
     faults: list[SceneError] = []
     size = _size(number_at(scene, label), label, base)
-    for share, stencil in itertools.product(STEPS, (central(), one_sided(1.0), one_sided(-1.0))):
+    for share, stencil in itertools.product(REDUCED, (central(), one_sided(1.0), one_sided(-1.0))):
         try:
-            found.append(_differences(scene, label, share * size, stencil, base))
+            found.append(_differences(scene, label, share * step * size, stencil, base))
         except SceneError as fault:
             faults.append(fault)
         if found and found[-1].error <= ACCURATE:
@@ -121,10 +123,12 @@ def _at(scene: Scene, path: str) -> Any:
 
 
 def _size(value: float, path: str, base: Model) -> float:
-    """Return the size that the increments of a number have as unit."""
-    if re.search(r"anchor|point|position", path):
-        return base.length
-    return abs(value) or 1.0
+    """Return the size of a number: its value or 1, and for points the length of the shortest spring or of the
+    mechanism."""
+    if not re.search(r"anchor|point|position", path):
+        return abs(value) or 1.0
+    start = base.start()[None]
+    return base.length * float(shortest_spring(base, start)[0])
 
 
 def _differences(scene: Scene, label: str, step: float, stencil: Stencil, base: Model) -> SceneNumber:

@@ -30,8 +30,8 @@ from mbref.scenes import find_scene
 from mbref.simulation.simulate import SAMPLES, checked_times
 from mbref.stepping.limits import FINEST, Limits
 
-# of a solution, and of a more accurate one. Truncation of the step h is h⁸ near a spring of unit length, and
-# rounding is 2e-16/h
+# of a solution, and of a more accurate one. A step h (lengths of the shortest spring, or shares of a number)
+# has a truncation of about 600 h⁸ and a rounding of 2e-16/h
 FIRST_PRECISION, SECOND_PRECISION = Precision(12, 0.02), Precision(16, 0.01)
 RTOL = 1e-12  # default relative tolerance of the runs
 FINER = 0.1  # tolerance of the more accurate run / tolerance
@@ -142,14 +142,24 @@ class DerivativeRequest:
             raise InputError(f"{count}; derivatives are for up to {MOST_ROWS}")
         self.method = Method.parse(default_method(scene))
         self.motion: Motion | None = None  # of the first solution
-        fields = [label for label in labels if not is_of_start(label)]
-        self.of_scene = [scene_number(scene, label, self.model) for label in fields]
+        self.of_scene: list[SceneNumber] = []  # of the last solution
         self.units = [unit_of_number(scene, label) for label in labels]
+
+    def differentiate(self, step: float) -> list[SceneNumber]:
+        """Return the numbers that are fields of the scene, with variants at a step over their sizes."""
+        fields = [label for label in self.labels if not is_of_start(label)]
+        self._release_variants()
+        self.of_scene = [scene_number(self.scene, label, self.model, step) for label in fields]
+        return self.of_scene
+
+    def _release_variants(self) -> None:
+        for model in (variant for number in self.of_scene for variant in number.models):
+            model.release()
 
     def release(self) -> None:
         """Release the memory of the models."""
-        for each in (self.model, *(variant for number in self.of_scene for variant in number.models)):
-            each.release()
+        self._release_variants()
+        self.model.release()
 
     def solved(self, method: Method, limits: Limits, precision: Precision) -> Derivatives:
         """Return the derivatives of the outputs along a run by a method."""
@@ -157,11 +167,12 @@ class DerivativeRequest:
         run = Followed.of(self.scene, model, method, limits, self.samples, gauss(precision.points))
         motion = run.motion
         names = differentiable(motion, self.of)
+        numbers = self.differentiate(step)
         started = [label for label in self.labels if is_of_start(label)]
         of_start = [start_number(label, motion, model, run.first, step) for label in started]
-        every: list[SceneNumber | StartNumber] = [*self.of_scene, *of_start]
+        every: list[SceneNumber | StartNumber] = [*numbers, *of_start]
         starts = [(number.x, number.v) for number in every]
-        found = VariationalEquations(model, run, self.of_scene, step).changes(starts)
+        found = VariationalEquations(model, run, numbers, step).changes(starts)
         columns, by_label = Columns(motion, names, step), {}
         for number, along in zip(every, found.along, strict=True):
             parts = [columns.along(model, found.states, along)]

@@ -68,18 +68,18 @@ class Direction(NamedTuple):
             for change, whole in changes
         ]
         moved = np.abs(self.x / model.units).max(axis=1, initial=0.0) / (
-            step * _shortest_spring(model, states)
+            step * shortest_spring(model, states.q)
         )
         largest = np.max([moved, *shares], axis=0)
         return np.asarray(1.0 / np.where(largest > 0.0, largest, 1.0))
 
 
-def _shortest_spring(model: Model, states: States) -> np.ndarray:
-    """Return the length (k,) of the shortest spring, in lengths of the mechanism; at most 1."""
-    loads, count = model.data.loads, states.times.size
+def shortest_spring(model: Model, q: np.ndarray) -> np.ndarray:
+    """Return the length (k,) of the shortest spring at q (k, 7 nb) over the mechanism's; at most 1."""
+    loads, count = model.data.loads, len(q)
     springs = np.flatnonzero(loads.kind == SPRING)
     frame = np.broadcast_to([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (count, 1, 7))
-    poses = np.concatenate([states.q.reshape(count, model.nb, 7), frame], axis=1)
+    poses = np.concatenate([q.reshape(count, model.nb, 7), frame], axis=1)
     ends = (
         poses[:, bodies, :3] + rotations.rotate(poses[:, bodies, 3:], points[None])
         for bodies, points in (

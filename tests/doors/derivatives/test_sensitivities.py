@@ -124,6 +124,21 @@ def test_angle_of_geared_wheels_depends_on_ratio_and_inertia_as_in_closed_form()
         assert_close(found.values[:, 0, k], true)
 
 
+def test_acceleration_by_a_short_spring_depends_on_its_ends_as_in_closed_form():
+    """m a = -k (l - l₀) x/l, l² = x² + y², with m = 2 kg, k = 50 N/m, l₀ = 0.05 m; the slide is 1 m long."""
+    carts = [body(name, 2.0, [0.1] * 3, (x, 0.0, 0.0)) for name, x in (("near", 0.1), ("far", 1.0))]
+    ends = {"bodies": ["ground", "near"], "points": [[0.0, 0.1, 0.0], [0.1, 0.0, 0.0]]}
+    load = [{"type": "spring", **ends, "stiffness": 50.0, "natural_length": 0.05}]
+    joints = [slide(cart["name"], "ground", cart["name"], cart["position"]) for cart in carts]
+    scene = Scene(name="carts", body=carts, joint=joints, load=load)
+
+    def force_over_mass(x, y):
+        return -25.0 * (1 - 0.05 / np.sqrt(x**2 + y**2)) * x
+
+    found = mbref.sensitivities(scene, ["near.acceleration.x"], ["load[0].points[0].y"], [0.0])
+    assert_close(found.values[0, 0], np.array([slope(force_over_mass, {"x": 0.1, "y": 0.1}, "y")]))
+
+
 def test_derivative_of_a_conserved_energy_stays_the_one_at_the_start():
     """∂E/∂g_y = -Σ m y at the start, in a loop with redundant rows whose velocities are given."""
     scene = mbref.find_scene("planar_slider_crank_gravity")
