@@ -12,15 +12,21 @@ from mbref.scene.joints import JOINT_TYPES
 from mbref.scene.units import fits
 
 
+def _text(entry: Any, key: str) -> str:
+    """Return a name or type of an entry; empty if it is no text, which its field reports."""
+    found = field_of(entry, key)
+    return found if isinstance(found, str) else ""
+
+
 def _stop_faults(data: Mapping[str, Any], joints: list[Any]) -> Faults:
     """Yield end stops of driven coordinates, and their ends in other units than the coordinate's."""
-    driven = {field_of(driver, "joint") for driver in listed(data.get("driver", ()))}
+    driven = {_text(driver, "joint") for driver in listed(data.get("driver", ()))}
     for i, joint in enumerate(joints):
-        kind, stop = field_of(joint, "type"), field_of(joint, "stop")
+        kind, stop = _text(joint, "type"), field_of(joint, "stop")
         coordinate = JOINT_TYPES[kind].facts.driven if kind in JOINT_TYPES else None
         if not stop or coordinate is None:
             continue
-        if field_of(joint, "name") in driven:
+        if _text(joint, "name") in driven - {""}:
             yield f"joint[{i}].stop", "needs a joint without a driver, which prescribes the coordinate"
         for end in ("lower", "upper"):
             if not fits(value := field_of(stop, end), QUANTITY_OF[coordinate]):
@@ -30,7 +36,7 @@ def _stop_faults(data: Mapping[str, Any], joints: list[Any]) -> Faults:
 def interval_faults(data: Mapping[str, Any]) -> Faults:
     """Yield the entries that need a joint that always holds, and a way to engage without intervals."""
     joints = listed(data.get("joint", ()))
-    sometimes = {field_of(joint, "name") for joint in joints if field_of(joint, "active") is not None}
+    sometimes = {_text(joint, "name") for joint in joints if field_of(joint, "active") is not None}
     for key in ("joint", "coupling"):
         for i, entry in enumerate(listed(data.get(key, ()))):
             if field_of(entry, "active") is None and field_of(entry, "engages") not in (None, "anywhere"):

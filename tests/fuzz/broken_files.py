@@ -4,7 +4,7 @@ import json
 import random
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 MJCF = """<mujoco model="{name}"><worldbody><body name="rod" pos="0 0 1">
 <joint name="a" type="hinge" axis="0 1 0" armature="0.1" damping="0.2"/>
@@ -28,10 +28,7 @@ NUMBERS = (
 )
 NAMES = ("model", "model", "../../up", "two words", "a\x1b[31mb", "&lt;b&gt;", "$x$", "$(touch pwned)", "")
 PIECES = (
-    *(
-        *(b"", b"\x00", b"\xff\xfe", b"<", b">", b"<!--", b"]]>", b'"', b"&amp;", b"&x;", b"<a>" * 3000),
-        *(b"[" * 100_000,),
-    ),
+    *(b"", b"\x00", b"\xff\xfe", b"<", b">", b"<!--", b"]]>", b'"', b"&x;", b"<a>" * 3000, b"[" * 100_000),
     *(b"nan", b"1e400", b"null", b"{}", b"\n", b",", b";", b"\t", b"\x1b[2J", b"0\n" * 50, b"<include/>"),
 )
 RECORD: dict[str, Any] = {
@@ -60,54 +57,50 @@ STRANGE = (None, 0, -1, "x", "", [], {}, [None], {"a": 1}, True, 1e308, "\x1b[31
 LINES = (b"null", b"[" * 100_000, b"\xff\x00", b"{}", b"[]", b'{"key": 1}', b'{"key": "a"}', b'"key"', b"NaN")
 
 
-class _Files(NamedTuple):
-    def write(self, draw: random.Random, suffixes: Sequence[str] = ()) -> str:
-        """Write a file of one of the suffixes, damaged in two of three cases; return its name."""
-        suffix = draw.choice(tuple(suffixes) or tuple(SAMPLES))
-        text = SAMPLES[suffix].format(name=draw.choice(NAMES), number=draw.choice(NUMBERS))
-        content = text.encode()
-        for _ in range(draw.choice((0, 1, 1, 2))):
-            a, b = sorted(draw.randrange(len(content) + 1) for _ in range(2))
-            content = content[:a] + draw.choice(PIECES) + content[min(b, a + 30) :]
-        path = Path(f"given{draw.choice(('', '', ' two', '$(id)'))}{suffix}")
-        path.write_bytes(content)
-        return str(path)
+def write_file(draw: random.Random, suffixes: Sequence[str] = ()) -> str:
+    """Write a file of one of the suffixes, damaged in two of three cases; return its name."""
+    suffix = draw.choice(tuple(suffixes) or tuple(SAMPLES))
+    text = SAMPLES[suffix].format(name=draw.choice(NAMES), number=draw.choice(NUMBERS))
+    content = text.encode()
+    for _ in range(draw.choice((0, 1, 1, 2))):
+        a, b = sorted(draw.randrange(len(content) + 1) for _ in range(2))
+        content = content[:a] + draw.choice(PIECES) + content[min(b, a + 30) :]
+    path = Path(f"given{draw.choice(('', '', ' two', '$(id)'))}{suffix}")
+    path.write_bytes(content)
+    return str(path)
 
 
-class _Folders(NamedTuple):
-    def write(self, draw: random.Random) -> str:
-        """Write a report's folder with a record that lacks a field, has a strange one, or is no record."""
-        folder = Path(draw.choice(("records", "two records")))
-        (folder / "scenes").mkdir(parents=True, exist_ok=True)
-        if draw.random() < 0.7:
-            from mbref.scenes import SCENES
+def write_folder(draw: random.Random) -> str:
+    """Write a report's folder with a record that lacks a field, has a strange one, or is no record."""
+    folder = Path(draw.choice(("records", "two records")))
+    (folder / "scenes").mkdir(parents=True, exist_ok=True)
+    if draw.random() < 0.7:
+        from mbref.scenes import SCENES
 
-            SCENES["four_bar"]().save(folder / "scenes" / "four_bar.toml")
-        for name in draw.sample(("records", "timings", "truths", "motions", "stability", "paper"), 3):
-            (folder / f"{name}.jsonl").write_bytes(self._lines(draw))
-        if draw.random() < 0.2:
-            (folder / "conformance").mkdir(exist_ok=True)
-            (folder / "conformance" / "mbref.json").write_bytes(self._lines(draw))
-        if draw.random() < 0.2:
-            (folder / "paper-runs.json").write_bytes(self._lines(draw))
-        return draw.choice((str(folder), str(folder), f"{folder}/records.jsonl"))
-
-    def _lines(self, draw: random.Random) -> bytes:
-        record = json.loads(json.dumps(RECORD))
-        for _ in range(draw.choice((0, 1, 1, 2))):
-            table = draw.choice([record, *(value for value in record.values() if isinstance(value, dict))])
-            if table:
-                key = draw.choice(sorted(table))
-                if draw.random() < 0.4:
-                    del table[key]
-                else:
-                    table[key] = draw.choice(STRANGE)
-        lines = [json.dumps(record).encode()]
-        if draw.random() < 0.4:
-            lines.append(draw.choice(LINES))
-        if draw.random() < 0.2:
-            lines = [draw.choice(LINES)]
-        return b"\n".join(lines) + b"\n" * (draw.random() < 0.9)
+        SCENES["four_bar"]().save(folder / "scenes" / "four_bar.toml")
+    for name in draw.sample(("records", "timings", "truths", "motions", "stability", "paper"), 3):
+        (folder / f"{name}.jsonl").write_bytes(_lines(draw))
+    if draw.random() < 0.2:
+        (folder / "conformance").mkdir(exist_ok=True)
+        (folder / "conformance" / "mbref.json").write_bytes(_lines(draw))
+    if draw.random() < 0.2:
+        (folder / "paper-runs.json").write_bytes(_lines(draw))
+    return draw.choice((str(folder), str(folder), f"{folder}/records.jsonl"))
 
 
-FILES, FOLDERS = _Files(), _Folders()
+def _lines(draw: random.Random) -> bytes:
+    record = json.loads(json.dumps(RECORD))
+    for _ in range(draw.choice((0, 1, 1, 2))):
+        table = draw.choice([record, *(value for value in record.values() if isinstance(value, dict))])
+        if table:
+            key = draw.choice(sorted(table))
+            if draw.random() < 0.4:
+                del table[key]
+            else:
+                table[key] = draw.choice(STRANGE)
+    lines = [json.dumps(record).encode()]
+    if draw.random() < 0.4:
+        lines.append(draw.choice(LINES))
+    if draw.random() < 0.2:
+        lines = [draw.choice(LINES)]
+    return b"\n".join(lines) + b"\n" * (draw.random() < 0.9)

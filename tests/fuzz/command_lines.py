@@ -19,7 +19,7 @@ from mbref.command_line import output_file, output_folder, record_file
 from mbref.printable import ACTING
 from mbref.scenes import SCENES
 from tests.fuzz import mutations
-from tests.fuzz.broken_files import FILES, FOLDERS
+from tests.fuzz.broken_files import write_file, write_folder
 
 DOCUMENTED = (0, 1, 2, 130)  # exit statuses
 LEFT_OUT = {"--run", "--recheck", "--install"}  # options that measure for minutes, or change packages
@@ -41,25 +41,12 @@ HOSTILE = (
 )
 PLAIN = [word for word in HOSTILE if not {"/", "."} & set(word)]  # none leads to another folder
 WORDS = {  # values of an option or argument, by its name
-    "method": (
-        *mutations.METHODS,
-        "taylor",
-        "lm2+none/rk4[step=1e-3]",
-        "lm1+baumgarte[alpha=nan]/rk4",
-        "x/y",
-    ),
+    "method": (*mutations.METHODS, "lm2+none/rk4[step=1e-3]", "lm1+baumgarte[alpha=nan]/rk4", "x/y"),
     "setting": ("taylor", "defaults", "tuned", "stiff"),
     "family": ("taylor", "defaults"),
     "engine": ("mbref", "mujoco", "all", "os:path", "a:b", ":"),
     "beside": ("mbref", "mbref=taylor"),
-    "vary": (
-        "gravity[1]=0:1",
-        "body[0].mass=1+-0.1",
-        "body[9].mass=1:2",
-        "gravity[1]=1:0",
-        "x=1",
-        "a=nan:inf",
-    ),
+    "vary": ("gravity[1]=0:1", "body[0].mass=1+-0.1", "body[9].mass=1:2", "gravity[1]=1:0", "a=nan:inf"),
     "times": ("0,0.001", "0.001", "0,0", "1,0", "-1", "nan", "0,1e300", ",", "1e-300,2e-300"),
     "columns": ("energy", "crank.position", "A.angle", "driver(A).torque", "x", "load(0).power", "time"),
     "over": ("A.angle", "time", "x"),
@@ -82,14 +69,7 @@ WORDS = {  # values of an option or argument, by its name
     "without": ("armature,damping", "x", ","),
     "keyframe": ("0", "home", "9"),
 }
-SCENE_NAMES = (
-    *sorted(SCENES),
-    "four_bar_chain[3]",
-    f"four_bar_chain[{'9' * 20}]",
-    "four_bar_chain[0]",
-    "x",
-    "",
-)
+SCENE_NAMES = (*sorted(SCENES), *(f"four_bar_chain[{n}]" for n in ("3", "0", "9" * 20)), "x", "")
 
 
 class Command(NamedTuple):
@@ -149,7 +129,7 @@ def command_line(seed: int) -> str:
     assert new <= _allowed(chosen, words), f"{new} written: {shown}"
     assert _entries(Path()) == outside, f"{_entries(Path()) - outside} written outside: {shown}"
     if "--json" in words and status in (0, 1) and not {"-h", "--help"} & set(words):
-        json.loads(out, parse_constant=_refuse_constant)
+        json.loads(out, parse_constant=refuse_constant)
     return f"{chosen.name} {status}"
 
 
@@ -234,10 +214,7 @@ def _output(draw: random.Random, chosen: Command, strange: bool) -> str:
     Path("kept.csv").write_text("my own\n")
     Path("full").mkdir(exist_ok=True)
     Path("full/mine.txt").write_text("my own\n")
-    odd = (
-        *("kept.csv", "full", "no/such/x.svg", "/dev/full", "/dev/null"),
-        *("", "x" * 300, "..", "$(id).svg"),
-    )
+    odd = ("kept.csv", "full", "no/such/x.svg", "/dev/full", "/dev/null", "", "x" * 300, "..", "$(id).svg")
     return draw.choice(odd) if strange else f"new.{suffix}".rstrip(".")
 
 
@@ -251,8 +228,8 @@ def _input(draw: random.Random, what: str, strange: bool) -> str:
     if strange and draw.random() < 0.1:
         return draw.choice((*HOSTILE, "no_such.toml", ".", "/dev/null"))
     if what in ("old", "new", "render") or (what == "records" and draw.random() < 0.3):
-        return FOLDERS.write(draw)
-    return FILES.write(draw, INPUTS[what])
+        return write_folder(draw)
+    return write_file(draw, INPUTS[what])
 
 
 @contextlib.contextmanager
@@ -269,5 +246,6 @@ def _standard_error() -> Iterator[TextIO]:
             os.close(kept)
 
 
-def _refuse_constant(name: str) -> float:
+def refuse_constant(name: str) -> float:
+    """Raise AssertionError, for a number that JSON does not have."""
     raise AssertionError(f"{name} is no JSON")

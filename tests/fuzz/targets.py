@@ -18,7 +18,7 @@ from mbref.scene import Scene, SceneError
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, prepare, simulate
 from tests.fuzz import mutations
-from tests.fuzz.command_lines import command_line, commands
+from tests.fuzz.command_lines import command_line, commands, refuse_constant
 
 LONG = 10.0  # s after which a case is interrupted
 PATIENCE = {"command_line": 3.0}  # s; measuring commands would take hours
@@ -61,7 +61,7 @@ def simulation(seed: int) -> str:
     except (SceneError, MethodError, ValueError) as error:
         assert str(error), "an error without a message"
         return type(error).__name__
-    json.loads(strict_json(run.to_record()), parse_constant=_refuse_constant)
+    json.loads(strict_json(run.to_record()), parse_constant=refuse_constant)
     return run.outcome.name
 
 
@@ -70,10 +70,6 @@ def _accepted(draw: random.Random) -> Scene:
     while True:
         with contextlib.suppress(SceneError):
             return Scene(**mutations.mutated_data(draw))
-
-
-def _refuse_constant(name: str) -> float:
-    raise AssertionError(f"{name} is no JSON")
 
 
 TARGETS = {f.__name__: f for f in (scene_file, scene_data, simulation, command_line)}
