@@ -14,28 +14,27 @@ NEARLY_SINGULAR = """<mujoco><worldbody><body name="a"><joint axis="0 1 0"/>
 <inertial pos="0 0 0" mass="1e-12" diaginertia="1e-13 1e-13 1e-13"/></body></body></worldbody></mujoco>"""
 
 
+# the armature cancels the inertia about the hinge, 1 + 1 · 1² kg m²
+CANCELLED = NOT_A_NUMBER.replace("0 nan 0", "0 1 0").replace("<joint", '<joint armature="-2"')
+IMPORT, FILES = (mbref, "import", "--out", "../a.toml"), (crosscheck, "files", "--engine", "mujoco")
+
+
 @pytest.mark.parametrize(
-    ("text", "status"), [(NOT_A_NUMBER, 2), (NEARLY_SINGULAR, 0)], ids=["refused", "imported"]
+    ("command", "text", "status"),
+    [
+        pytest.param(IMPORT, NOT_A_NUMBER, 2, id="refused"),
+        pytest.param(IMPORT, NEARLY_SINGULAR, 0, id="imported"),
+        pytest.param(FILES, CANCELLED, 0, id="compared", marks=pytest.mark.slow),
+    ],
 )
-def test_import_of_a_file_that_mujoco_warns_about_leaves_no_log(text, status, tmp_path, monkeypatch, capfd):
+def test_file_that_mujoco_warns_about_leaves_no_log(command, text, status, tmp_path, monkeypatch, capfd):
     """MuJoCo writes its warnings to the terminal and to MUJOCO_LOG.TXT in the working folder."""
-    file, here = tmp_path / "a.xml", tmp_path / "here"
-    file.write_text(text)
-    here.mkdir()
-    monkeypatch.chdir(here)
-    assert mbref(["import", str(file), "--out", str(tmp_path / "a.toml")]) == status
-    assert "WARNING" not in "".join(capfd.readouterr())
-    assert not os.listdir(here)
-
-
-@pytest.mark.slow
-def test_files_of_a_model_that_mujoco_warns_about_leaves_no_log(tmp_path, monkeypatch):
-    """The armature cancels the inertia, 1 + 1 · 1² kg m² about the hinge."""
-    file = tmp_path / "a.xml"
-    file.write_text(NOT_A_NUMBER.replace("0 nan 0", "0 1 0").replace("<joint", '<joint armature="-2"'))
+    (tmp_path / "a.xml").write_text(text)
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
-    assert crosscheck(["files", str(file), "--engine", "mujoco", "--no-advice"]) == 0
+    program, *words = command
+    assert program([*words, "../a.xml"]) == status
+    assert "WARNING" not in "".join(capfd.readouterr())
     assert not os.listdir()
 
 
