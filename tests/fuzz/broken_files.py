@@ -32,26 +32,13 @@ PIECES = (
     *(b"nan", b"1e400", b"null", b"{}", b"\n", b",", b";", b"\t", b"\x1b[2J", b"0\n" * 50, b"<include/>"),
 )
 RECORD: dict[str, Any] = {
-    "key": "k1",
-    "scene": "four_bar",
-    "engine": "mbref",
-    "version": "1",
-    "method": "taylor",
-    "family": "taylor",
-    "settings": {"rtol": 1e-9},
-    "outcome": "COMPLETED",
-    "message": "",
-    "t_end": 0.1,
-    "times": [0.0, 0.1],
-    "bodies": {},
-    "reactions": {},
+    **{"key": "k1", "scene": "four_bar", "engine": "mbref", "version": "1", "method": "taylor"},
+    **{"family": "taylor", "settings": {"rtol": 1e-9}, "outcome": "COMPLETED", "message": "", "t_end": 0.1},
+    **{"times": [0.0, 0.1], "bodies": {}, "reactions": {}, "time_limit": 60.0, "seed": 0},
     "metrics": {"error": 1e-12, "error_bound": 1e-13, "error_until": 0.1},
     "cost": {"seconds": 0.01, "build_seconds": 0.1, "steps": 3},
     "asked": {"engine": "mbref", "options": {"rtol": 1e-9}, "end": 0.1, "samples": 2},
-    "time_limit": 60.0,
-    "seed": 0,
-    "versions": {"python": "3"},
-    "machine": {"cpu": "x", "cores": 2, "system": "y"},
+    **{"versions": {"python": "3"}, "machine": {"cpu": "x", "cores": 2, "system": "y"}},
 }
 STRANGE = (None, 0, -1, "x", "", [], {}, [None], {"a": 1}, True, 1e308, "\x1b[31m", [[1]], "<b>")
 LINES = (b"null", b"[" * 100_000, b"\xff\x00", b"{}", b"[]", b'{"key": 1}', b'{"key": "a"}', b'"key"', b"NaN")
