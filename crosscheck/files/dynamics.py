@@ -25,7 +25,7 @@ MOST = 60  # joints; the motion of a machine with more takes seconds
 REGULAR = 1e-4  # smallest singular value of independent rows / largest one, away from singular positions
 MASSIVE = 1e-10  # least eigenvalue of a mass matrix with a unit diagonal; less is rounding of a massless link
 RTOL = 1e-6  # relative tolerance of the motion; the error found is 1e-8 and less
-MOST_WORK = 3000  # evaluations times joints of a motion, about ten seconds; a stiff one takes minutes
+MOST_WORK = 3000  # evaluations times joints of a motion: at most twenty seconds; a stiff one takes minutes
 
 
 class State(NamedTuple):
