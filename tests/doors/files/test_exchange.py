@@ -244,6 +244,15 @@ def test_import_writes_a_scene_that_export_writes_as_mjcf(tmp_path, capsys):
     assert mbref.counts(again) == mbref.counts(five), "bodies, rows and freedoms"
 
 
+def test_export_refuses_a_massless_link_by_its_name():
+    """MuJoCo reads no moving body without mass."""
+    scene = find_scene("four_bar_gravity")
+    empty = {"mass": 0.0, "inertia": (0.0, 0.0, 0.0)}
+    bodies = [b.model_copy(update=empty) if b.name == "coupler" else b for b in scene.body]
+    with pytest.raises(SceneError, match="body 'coupler': is a massless link"):
+        FORMAT.write(scene.with_(body=bodies))
+
+
 def test_export_refuses_an_unknown_format_and_import_a_missing_file(tmp_path, capsys):
     assert main(["export", "bricard", "--out", str(tmp_path / "five.obj")]) == 2
     assert "no format writes .obj; known: .xml" in capsys.readouterr().err

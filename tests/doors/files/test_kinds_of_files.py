@@ -18,7 +18,7 @@ from mbref.scene import SceneError
 from tests.crosscheck.originals import apart
 from tests.crosscheck.test_importing import LUMP, hinge, read
 
-KINDS = Path(__file__).parent / "models" / "kinds"
+KINDS = Path(__file__).parents[2] / "crosscheck" / "models" / "kinds"
 SAME = 1e-9  # of the largest distance moved, and of the largest entry of a matrix; worst measured 2e-11
 END = 0.02  # s, of the compared motions
 OPTIONS = {
