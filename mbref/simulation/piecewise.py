@@ -115,7 +115,9 @@ def _event(
     try:
         met = stops.meet(in_contact(before, contacts), after, state, contacts)
     except SceneError as fault:
-        raise cannot_hold(", ".join(engaged), t, fault.faults[0]) from None
+        if engaged:
+            raise cannot_hold(", ".join(engaged), t, fault.faults[0]) from None
+        raise SceneError([f"end stops: cannot be met at t = {t:.6g} s: {fault.faults[0]}"]) from None
     found = met.found
     event = Event(
         time=t,
