@@ -18,9 +18,8 @@ from crosscheck.engine import ALL, BUILT_IN, all_engines, default_engines, engin
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.pieces import events
 from mbref.command_line import MOST_DURATION
-from mbref.scene import Scene
+from mbref.scene import Scene, intervals
 from mbref.scene.fields import meant
-from mbref.scene.intervals import samples_at
 
 if TYPE_CHECKING:
     from crosscheck.conformance.own_limits import OwnLimits
@@ -135,7 +134,7 @@ def sample_times(scene: Scene, times: Sequence[float] | None, samples: int) -> n
     if not 2 <= samples <= most:
         bodies = f"the {len(scene.body)} bodies of {scene.name}"
         raise RequestError(f"--samples: at least 2 and at most {most} for {bodies}, got {samples}")
-    return samples_at(np.linspace(0.0, scene.duration, samples), events(scene, np.inf))
+    return intervals.samples_at(np.linspace(0.0, scene.duration, samples), events(scene, np.inf))
 
 
 def check_gap(gap: float | None, scene: Scene) -> None:
