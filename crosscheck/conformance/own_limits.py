@@ -118,7 +118,7 @@ def _faults(table: str, entry: Any, scenes: Collection[str]) -> list[str]:
     fields = FIELDS[table]
     found = [f"{key} is not a known field{meant(key, fields)}" for key in entry if key not in fields]
     check, known = entry.get("check"), abouts()
-    if check not in known:
+    if not isinstance(check, str) or check not in known:
         found.append(f"unknown check {check!r}; known: {', '.join(known)}{meant(str(check), known)}")
     named = entry.get("scenes", [])
     if not isinstance(named, list) or not all(isinstance(name, str) for name in named):

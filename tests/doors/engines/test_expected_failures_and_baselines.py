@@ -136,6 +136,7 @@ def test_junit_file_has_the_checks_that_ran_with_numbers_and_no_other_case(wrong
     ("text", "says"),
     [
         ("[limits]\nclosur = 1.0", "unknown check 'closur'; .* mean 'closure'"),
+        ("[[limit]]\ncheck = []\nallowed = 1", r"unknown check \[\]"),
         ("[limits]\nclosure = -1.0", "allowed of check 'closure' must be a positive number"),
         ('[[limit]]\ncheck = "closure"\nscenes = ["fre_fall"]\nallowed = 1', "mean 'free_fall'"),
         ('[[expected]]\ncheck = "closure"', "reason of check 'closure' is required"),
