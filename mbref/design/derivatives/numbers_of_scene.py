@@ -94,8 +94,12 @@ def scene_number(scene: Scene, label: str, base: Model, step: float) -> SceneNum
 
 
 def unit_of_number(scene: Scene, label: str) -> str:
-    """Return the SI unit of a number; empty for ratios, and for coefficients of functions of time."""
-    field = re.findall(r"(?:^|\.)([a-z_]+(?:\(0\))?)", re.sub(r"\.[xyz]$", "", label))[-1]
+    """Return the SI unit of a number; empty for ratios, and for coefficients of functions of time. Raises
+    SceneError for a path without a field."""
+    fields = re.findall(r"(?:^|\.)([a-z_]+(?:\(0\))?)", re.sub(r"\.[xyz]$", "", label))
+    if not fields:
+        raise SceneError([f"{label}: the scene has no number at this path"])
+    field = fields[-1]
     if field not in UNITS_OF_TURNS:
         return UNITS.get(field, "")
     slides = _at(scene, label.rpartition(".")[0]).type in ("spring", "slide_spring", "translational")

@@ -197,6 +197,7 @@ def test_derivative_of_a_random_mechanism_equals_differences_of_the_judges_refer
     [
         (pendulum(), "A.open", "body[bob].mass", "no derivative"),
         (pendulum(), "A.angle", "body[bob].name", "no number at this path"),
+        (pendulum(), "A.angle", "/7", "no number at this path"),
         (pendulum(), "A.angle", "joint[A].displacement(0)", "no joint 'A' with this coordinate"),
         (crank_linkage(ROCKER), "B.angle", "joint[A].angle(0)", "drivers prescribe the whole motion"),
         (crank_linkage(ROCKER), "B.angle", "joint[B].axis.x", "cannot stay closed"),
