@@ -202,7 +202,7 @@ def test_derivative_of_a_random_mechanism_equals_differences_of_the_judges_refer
         (crank_linkage(ROCKER), "B.angle", "joint[A].angle(0)", "drivers prescribe the whole motion"),
         (crank_linkage(ROCKER), "B.angle", "joint[B].axis.x", "cannot stay closed"),
     ],
-    ids=["output", "text", "coordinate", "driven", "tilted hinge of a planar loop"],
+    ids=["output", "text", "no field", "coordinate", "driven", "tilted hinge of a planar loop"],
 )
 def test_output_or_number_without_a_derivative_is_refused_by_name(scene, of, to, reason):
     with pytest.raises((mbref.InputError, mbref.SceneError), match=reason):
