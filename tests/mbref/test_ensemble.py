@@ -154,6 +154,7 @@ def test_killed_process_loses_only_the_call_that_killed_it(tmp_path: Path):
     assert [call.result() for call in calls if call.exception() is None] == [2**k for k in range(8) if k != 2]
 
 
+@pytest.mark.slow
 def test_interrupt_ends_calls_of_processes_that_still_run():
     """The call would sleep for a day; without the interrupt's effect on it, this test does not end."""
     with pytest.raises(KeyboardInterrupt), processes(1) as pool:
