@@ -235,15 +235,17 @@ def prepare_all(kernels: Sequence[Exchangeable], method: str = "") -> None:
     Kernels that another process compiles come last, so that processes with different orders share the work.
     """
     elsewhere, before = [], _method.set(method)
-    with garbage_kept():
-        for each in kernels:
-            if each.is_compiled_elsewhere:
-                elsewhere.append(each)
-            else:
+    try:
+        with garbage_kept():
+            for each in kernels:
+                if each.is_compiled_elsewhere:
+                    elsewhere.append(each)
+                else:
+                    each.prepare()
+            for each in elsewhere:
                 each.prepare()
-        for each in elsewhere:
-            each.prepare()
-    _method.reset(before)
+    finally:
+        _method.reset(before)
 
 
 def pair_of(first: types.Type, second: types.Type) -> types.Type:
