@@ -2,6 +2,7 @@
 
 import json
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -66,7 +67,8 @@ def test_a_comparison_refuses_an_unknown_depth_or_engine():
 
 
 def test_runs_of_one_engine_follow_each_other_and_do_not_wait_for_their_measurement():
-    """Two engines with three runs each; ``measure`` returns only after all six runs have ended."""
+    """Two engines with three runs each of 20 ms or more, so that runs that overlap are seen; ``measure``
+    returns only after all six runs have ended."""
     cases = [
         Case(BLOCK, np.array([0.0, 1.0]), engine, Setting("f", {"k": k}))
         for k in range(3)
@@ -78,6 +80,7 @@ def test_runs_of_one_engine_follow_each_other_and_do_not_wait_for_their_measurem
         assert asked.engine not in going, "two runs of one engine at a time"
         going.add(asked.engine)
         order.append((asked.engine, asked.setting.options["k"]))
+        time.sleep(0.02)
         if len(order) == len(cases):
             all_run.set()
         going.discard(asked.engine)

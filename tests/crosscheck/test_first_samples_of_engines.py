@@ -150,7 +150,7 @@ def test_first_sample_of_an_engine_has_the_start_velocities_of_the_judge(way: st
 
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("way", WAYS)
-def test_first_sample_of_an_engine_has_the_accelerations_of_gausss_principle(way: str, name: str) -> None:
+def test_first_sample_of_an_engine_has_the_accelerations_of_gauss_s_principle(way: str, name: str) -> None:
     """WAYS has the largest difference allowed, relative to the largest acceleration or 1 (m/s², rad/s²)."""
     if way == "exudyn" and SCENES[name].driver:
         pytest.skip("Exudyn gives neither accelerations nor reactions of a driven scene")

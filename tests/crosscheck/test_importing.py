@@ -10,6 +10,7 @@ import pytest
 import mbref
 from crosscheck.engines.mujoco.importing.reading import Source, source
 from crosscheck.judge.gauss_principle import gauss, rank
+from mbref import rotations
 from mbref.formats import ImportOptions
 from mbref.scene import SceneError
 
@@ -145,7 +146,8 @@ def test_a_weld_without_torque_is_a_spherical_joint(tmp_path):
 
 
 def test_bodies_of_a_weld_are_assembled_at_its_relative_pose(tmp_path):
-    """``relpose`` turns body b by 0.5 rad about y: its quaternion is (cos 0.25, 0, sin 0.25, 0)."""
+    """``relpose`` is the pose of frame b in a: (0.3, 0.1, 0) m, turned by 0.5 rad about y, its quaternion is
+    (cos 0.25, 0, sin 0.25, 0). Both centres of mass are at (0.1, 0.02, 0) m. A note says that it was open."""
     two = f"""<mujoco><worldbody><body name="a" pos="0 0 1">{hinge("A")}{hinge("A2", "1 0 0")}{LUMP}</body>
     <body name="b" pos="0.4 0 1"><freejoint/>{LUMP}</body></worldbody>
     <equality><weld name="W" body1="a" body2="b"
@@ -155,8 +157,12 @@ def test_bodies_of_a_weld_are_assembled_at_its_relative_pose(tmp_path):
     joint = held.imported.scene.joint_named("W")
     assert joint.type == "fixed" and any("'W' was open by" in note for note in held.imported.notes)
     a, b = held.imported.scene.body
-    angle = 2 * np.arccos(abs(np.dot(a.orientation, b.orientation)))
-    assert angle == pytest.approx(0.5, abs=1e-9)  # rad
+    back = rotations.conjugate(np.array(a.orientation))
+    apart = rotations.rotate(back, np.subtract(b.position, a.position))
+    turn = rotations.multiply(back, np.array(b.orientation))
+    expected = [0.3 + 0.1 * (np.cos(0.5) - 1.0), 0.1, -0.1 * np.sin(0.5)]  # m
+    assert apart == pytest.approx(expected, abs=1e-9)
+    assert turn * np.sign(turn[0]) == pytest.approx([np.cos(0.25), 0.0, np.sin(0.25), 0.0], abs=1e-9)
     assert difference(held) < SAME
 
 

@@ -177,12 +177,13 @@ def test_scenes_without_small_motions_are_refused(change, says):
 
 
 def test_poses_of_a_slider_crank_close_its_joints_and_hang_or_stand():
-    """Under gravity the crank hangs (stable) or stands (unstable). Joints are closed to 1e-8 m or rad at
-    every pose found; a slider turned by half a turn, on another branch, would open them."""
+    """Under gravity along -y the crank, the first body, hangs below its axis at the origin (stable) or stands
+    above it (unstable). Joints are closed to 1e-8 m or rad; a slider turned by a half turn opens them."""
     scene = find_scene("planar_slider_crank").with_(gravity=(0.0, -9.81, 0.0), load=[])
     found = steady_poses(scene)
     assert {"stable", "unstable"} <= {each.stability for each in found}
     for each in found:
+        assert (each.position[0, 1] < 0.0) == (each.stability == "stable"), each
         for rows in closure(scene, 0.0, each.position, each.orientation).values():
             assert np.abs(rows).max(initial=0.0) < 1e-8
 

@@ -27,15 +27,10 @@ KNOWN: dict[tuple[str, str, str], str] = {  # (engine, scene, check): why it fai
 }
 
 
-def violations(name: str, scenes: tuple[str, ...], related: bool) -> dict[tuple[str, str, str], str]:
-    """Return the checks that fail, by engine, scene and check, with measured and allowed values."""
-    found = {}
-    for scene in scenes:
-        bench = trial.set_up(InProcess(engine(name)), replace(SPECIMENS[scene], related=related))
-        for verdict in suite.examine(bench):
-            if verdict.status == suite.FAIL:
-                found[name, scene, verdict.property] = f"{verdict.measured}, allowed {verdict.allowed}"
-    return found
+def verdicts(name: str, scene: str, related: bool) -> list[suite.Verdict]:
+    """Return the verdicts of all checks on an engine's runs of a scene."""
+    specimen = replace(SPECIMENS[scene], related=related)
+    return list(suite.examine(trial.set_up(InProcess(engine(name)), specimen)))
 
 
 def known(name: str, scenes: tuple[str, ...]) -> set[tuple[str, str, str]]:
@@ -44,8 +39,11 @@ def known(name: str, scenes: tuple[str, ...]) -> set[tuple[str, str, str]]:
 
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_built_in_engine_violates_no_check_on_six_probes(name):
-    """Checks of the suite, such as truth, energy and reactions; QUICK has the probes."""
-    assert not violations(name, QUICK, related=False)
+    """No probe (QUICK) is refused, and at least 14 of 19 checks, such as truth and reactions, pass. Others do
+    not apply: momentum, energy with drivers, Exudyn's reactions and accelerations with drivers."""
+    for scene in QUICK:
+        found = [verdict.status for verdict in verdicts(name, scene, related=False)]
+        assert set(found) <= {"pass", "outside"} and found.count("pass") >= 14, (scene, found)
 
 
 @pytest.mark.slow
@@ -60,5 +58,7 @@ def test_built_in_engine_violates_no_check_on_six_probes(name):
 )
 def test_built_in_engine_violates_only_known_checks_of_couplings_relations_and_laws(name, scenes, related):
     """KNOWN has the reasons; findings and the page on invariants have the numbers of laws."""
-    found = violations(name, scenes, related)
-    assert set(found) == known(name, scenes), found
+    found = [verdict for scene in scenes for verdict in verdicts(name, scene, related)]
+    failed = {(name, each.scene, each.property): each for each in found if each.status == "fail"}
+    assert set(failed) == known(name, scenes), failed
+    assert any(each.status == "pass" for each in found)

@@ -50,6 +50,7 @@ def scripted(**fields: object) -> Finding:
 
 
 def test_a_finding_without_a_proof_is_unclear_and_one_without_its_package_absent() -> None:
+    """The words name the missing proof, and the command that installs the package."""
     ending = scripted(script="", crashes=True).recheck()
     assert ending.status is Status.UNCLEAR and "no proof is stored" in ending.words, ending
     absent = scripted(package="no-such-package").recheck()
@@ -57,6 +58,7 @@ def test_a_finding_without_a_proof_is_unclear_and_one_without_its_package_absent
 
 
 def test_an_unknown_finding_is_refused_with_the_nearest_name() -> None:
+    """The finding exists; its name is asked without the e of "turned"."""
     with pytest.raises(RequestError, match="dart-hinge-closure-turned"):
         chosen(["dart-hinge-closure-turnd"])
 
@@ -82,6 +84,7 @@ def test_the_proof_of_a_finding_gives_its_stored_number_at_the_stored_version(na
 
 
 def test_the_command_rechecks_a_finding_and_prints_its_status(capsys: pytest.CaptureFixture[str]) -> None:
+    """A four-bar that is turned in space falls apart in DART again."""
     pytest.importorskip("dartpy")
     assert main(["findings", "dart-hinge-closure-turned", "--recheck"]) == 0
     assert re.search(r"dart.*present", capsys.readouterr().out, re.DOTALL)
@@ -98,6 +101,7 @@ def test_readers_of_files_are_findings_and_our_own_import_is_not(capsys: pytest.
 
 @pytest.mark.slow
 def test_cells_of_mujoco_are_read_again_and_none_has_changed(capsys: pytest.CaptureFixture[str]) -> None:
+    """The command reads the small files by MuJoCo and compares each outcome with the stored one."""
     pytest.importorskip("mujoco")
     assert main(["findings", "files-mujoco", "--recheck"]) == 0
     assert re.search(r"mujoco.*present.*changed: none", " ".join(capsys.readouterr().out.split()))

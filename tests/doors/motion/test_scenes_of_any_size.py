@@ -50,18 +50,17 @@ def test_floors_of_a_lattice_are_pendulums_on_pendulums(method):
         foot = foot + up
 
 
-def test_stacked_platforms_fall_as_folding_bars_let_them():
-    """Lagrange's equations in the angles of the bars from the horizontal, with the Jacobians of heights and
-    reaches, integrated by scipy."""
-    count, end, half, bar_mass, platform_mass = 2, 0.15, 0.5, 0.5, 1.0  # bars of 0.5 m
-    across = bar_mass * (3 * 0.01**2 + half**2) / 12
-    # rows of (height, reach) of bodies by sin and cos of the bars' angles: bars, then the platform
-    falls = [[0.0] * k + [share] + [0.0] * (count - k - 1) for k in range(count) for share in (0.5, 1.5)]
-    heights = np.array([[2.0] * k + fall[k:] for k, fall in zip([0, 0, 1, 1], falls, strict=True)])
-    tops = np.array([[2.0] * (k + 1) + [0.0] * (count - k - 1) for k in range(count)])
-    masses = np.array([2 * bar_mass] * len(heights) + [platform_mass] * count)
-    rises = half * np.vstack([heights, tops])
-    reaches = half / 2 * np.vstack([np.eye(count).repeat(2, axis=0), np.zeros((count, count))])
+def test_platforms_of_a_sarrus_stack_fall_as_lagranges_equations():
+    """Two levels, each of two pairs of bars (lower and upper, 0.5 m, 0.5 kg) at one angle a_k from the
+    horizontal, 60° at rest. A platform (1 kg) is 2 · 0.5 m · Σ sin a above the ground, over its own level and
+    those below. Lagrange's equations of a₀ and a₁, with Jacobians of heights and reaches, by scipy."""
+    count, end, length, bar_mass, platform_mass = 2, 0.15, 0.5, 0.5, 1.0  # s, m, kg, kg
+    across = bar_mass * (3 * 0.01**2 + length**2) / 12  # kg m², of a bar of radius 0.01 m about its middle
+    heights = [[0.5, 0], [1.5, 0], [2, 0.5], [2, 1.5]]  # middles of bars / (length sin a): lower, upper, …
+    tops = [[2, 0], [2, 2]]  # platforms / (length sin a)
+    masses = np.array([2 * bar_mass] * 4 + [platform_mass] * 2)
+    rises = length * np.array(heights + tops)
+    reaches = length / 2 * np.array([[1, 0], [1, 0], [0, 1], [0, 1], [0, 0], [0, 0]])  # / cos a, outwards
 
     def rate(_, y):
         angle, speed = np.split(y, 2)
@@ -74,8 +73,8 @@ def test_stacked_platforms_fall_as_folding_bars_let_them():
     bodies, _ = motion_of(f"sarrus_stack[{count}]", "taylor", end)
     start = [*np.full(count, np.radians(60)), *np.zeros(count)]
     angles = solve_ivp(rate, (0.0, end), start, **EXACT).y[:count, -1]
-    found = [bodies[f"platform{k}"][1] for k in range(count)]
-    assert np.array(found)[:, 2] == pytest.approx(rises[-count:] @ np.sin(angles), abs=CLOSE)
+    found = [bodies[f"platform{k}"][1, 2] for k in range(count)]
+    assert found == pytest.approx(2 * length * np.cumsum(np.sin(angles)), abs=CLOSE)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -40,21 +40,22 @@ def test_commands_name_two_drivers_of_one_slide_whose_motions_differ(power, shar
 
 
 ROWS = [(t, 0.4 * t) for t in np.linspace(0.0, 1.0, 101).tolist()]  # a table of 0.4 t m
-WAVE = {"amplitude": 1e-11, "frequency": 1e3}
-SEEN_NOWHERE = {"amplitude": 1e-7, "frequency": 200 * np.pi, "phase": np.pi / 2}  # zero at t = 0, 0.01 …
+WAVE = {"amplitude": 1e-11, "frequency": 1e3}  # m, rad/s
+CRESTS = {"amplitude": 1e-7, "frequency": 200 * np.pi, "phase": np.pi / 2}  # 1e-7 m at t = 0, 0.01 … s
 
 
 @pytest.mark.parametrize(
     "other",
     [
-        {"polynomial": [0.0, 0.4], "sine": WAVE},  # rates differ by 1e-8 m/s
-        {"polynomial": [-1e-7, 0.4], "sine": SEEN_NOWHERE},
+        {"polynomial": [0.0, 0.4], "sine": WAVE},
+        {"polynomial": [-1e-7, 0.4], "sine": CRESTS},
         {"table": [*ROWS[:50], (0.5, 0.2 + 1e-7), *ROWS[51:]]},
     ],
-    ids=["only in rate", "by a sine that is zero at even times", "at one row of a table"],
+    ids=["by 1e-8 m/s of rate", "only between multiples of 10 ms", "at one row of a table"],
 )
-def test_drivers_that_differ_only_in_rate_or_between_even_times_are_named(other):
-    """The first driver moves the slide by 0.4 t m."""
+def test_drivers_that_differ_in_rate_or_at_few_times_are_named(other):
+    """One driver moves the slide by 0.4 t m. The other adds 1e-11 sin(1000 t) m, whose rate is up to 1e-8
+    m/s; or 1e-7 (cos(200 π t) - 1) m, zero at multiples of 10 ms; or 1e-7 m to the table's row at 0.5 s."""
     scene = twice_driven([0.0, 0.4], [0.0]).with_(
         driver=[{"joint": "left", "polynomial": [0.0, 0.4]}, {"joint": "right", **other}]
     )
