@@ -137,6 +137,8 @@ COLLECTIONS: Mapping[str, Sequence[str]] = {  # package and version → files in
 LONGEST = 400  # characters of a record's words
 READERS = tuple(PLACES)  # in the order of tables
 FAULTY = "faulty file"  # grade of a file that its format's specification does not allow, or MuJoCo for MJCF
+ENDED = ("the process was ended by", "no result after")  # begin refusals of a reader that ended or hung
+NO_MACHINE = "no machine"  # their words: a record does not connect such an end with its file
 Record = dict[str, Any]
 
 
@@ -178,6 +180,7 @@ def _of_reader(
                     file = replace(file, asked=replace(file.asked, states=(), starts=()))
                 reading = read_in(child, reader, file, limit)
                 words = reading.refusal or "; ".join(sentences(reading.differences, reading.messages))
+                words = NO_MACHINE if words.startswith(ENDED) else words
                 folder = str(files[key].path).removesuffix(path)
                 words = words.replace(folder, "")
                 found.append(_record(package, path, reading.reader, reading.version, reading.grade, words))
