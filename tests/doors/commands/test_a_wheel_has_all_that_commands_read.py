@@ -33,6 +33,8 @@ COMMANDS = {
         ("plot", "four_bar_gravity", "energy", *SHORT, "--out", "energy.svg"),
         ("equilibrium", "four_bar_gravity"),
         ("modes", "four_bar_gravity"),
+        ("sensitivities", "four_bar_gravity", *SHORT, "--of", "energy", "--to", "gravity.y"),
+        ("fit", "--help"),
         ("ensemble", "four_bar_gravity", "--help"),
         ("import", "model.xml"),
         ("export", "four_bar_gravity", "--out", "four_bar.xml"),
