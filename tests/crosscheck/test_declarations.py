@@ -52,10 +52,7 @@ def with_unknown(**parts: tuple) -> Scene:
 
 MAST = Telescopic(name="mast", bodies=("ground", "body"), anchor=(0, 0, 0), axis=(0, 0, 1))
 UNKNOWN = {  # a scene with an undeclared part, and words of its refusal
-    "joint": (
-        with_unknown(joint=(Screw(name="thread", bodies=("ground", "b")),)),
-        ("'thread'", "'screw'"),
-    ),
+    "joint": (with_unknown(joint=(Screw(name="thread", bodies=("ground", "b")),)), ("'thread'", "'screw'")),
     "driven": (with_unknown(joint=(MAST,), driver=(Driver(joint="mast"),)), ("'mast'", "length")),
     "load": (with_unknown(load=(Magnet(),)), ("load[0]", "'magnet'")),
 }

@@ -93,6 +93,7 @@ def test_hint_names_the_term_of_the_equations_that_is_wrong(defect, names, says,
 
 
 def test_hint_for_an_engine_with_right_accelerations_points_at_its_integration(monkeypatch):
+    """The example engine has no defect (""), and the failure of check truth is made up."""
     found = hint(runner_with("", monkeypatch), [Failure(KNOWN["pendulum"], "truth")])
     assert "begin with the scene 'pendulum', check truth" in found
     assert "accelerations agree with the judge's, so look at the integration" in found

@@ -46,10 +46,7 @@ def test_coupling_takes_the_angle_of_a_joint_that_has_one_and_otherwise_the_disp
         ({"name": "A"}, "coupling[A].name: 'A' is already the name of a joint"),
         ({"joints": ["A"]}, "coupling[teeth].joints: must be two or more names of joints, got ['A']"),
         ({"polynomial": [1.0, 2.0]}, "coupling[teeth].polynomial: or ratio, not both"),
-        (
-            {**BENT, "polynomial": [1.0, 0.0]},
-            f"coupling[teeth].polynomial: {NO_END}",
-        ),
+        ({**BENT, "polynomial": [1.0, 0.0]}, f"coupling[teeth].polynomial: {NO_END}"),
         ({**BENT, "polynomial": [1.0, "2 m"]}, "coupling[teeth].polynomial[1]: is in rad/rad^2, got '2 m'"),
         ({"ratoi": 1.0}, "coupling[teeth].ratoi: is not a known field; did you mean 'ratio'?"),
     ],

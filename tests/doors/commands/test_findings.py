@@ -83,11 +83,18 @@ def test_the_proof_of_a_finding_gives_its_stored_number_at_the_stored_version(na
     assert math.isnan(found.measured) or answer.measured == pytest.approx(found.measured, rel=0.05), answer
 
 
-def test_the_command_rechecks_a_finding_and_prints_its_status(capsys: pytest.CaptureFixture[str]) -> None:
-    """A four-bar that is turned in space falls apart in DART again."""
-    pytest.importorskip("dartpy")
-    assert main(["findings", "dart-hinge-closure-turned", "--recheck"]) == 0
-    assert re.search(r"dart.*present", capsys.readouterr().out, re.DOTALL)
+@pytest.mark.parametrize(
+    ("module", "name", "says"),
+    [
+        ("dartpy", "dart-hinge-closure-turned", r"dart.*present"),
+        ("mujoco", "files-mujoco", r"mujoco.*present.*changed: none"),
+    ],
+)
+def test_the_command_rechecks_a_finding_and_prints_its_status(module, name, says, capsys) -> None:
+    """A four-bar turned in space falls apart in DART; MuJoCo reads small files as the stored cells say."""
+    pytest.importorskip(module)
+    assert main(["findings", name, "--recheck"]) == 0
+    assert re.search(says, " ".join(capsys.readouterr().out.split()))
 
 
 def test_readers_of_files_are_findings_and_our_own_import_is_not(capsys: pytest.CaptureFixture[str]) -> None:
@@ -97,11 +104,3 @@ def test_readers_of_files_are_findings_and_our_own_import_is_not(capsys: pytest.
     assert count / 2 < number < count == len(CASES)
     with pytest.raises(RequestError, match="unknown finding 'files-mbref'"):
         chosen(["files-mbref"])
-
-
-@pytest.mark.slow
-def test_cells_of_mujoco_are_read_again_and_none_has_changed(capsys: pytest.CaptureFixture[str]) -> None:
-    """The command reads the small files by MuJoCo and compares each outcome with the stored one."""
-    pytest.importorskip("mujoco")
-    assert main(["findings", "files-mujoco", "--recheck"]) == 0
-    assert re.search(r"mujoco.*present.*changed: none", " ".join(capsys.readouterr().out.split()))

@@ -209,8 +209,10 @@ def test_verdict_on_right_failed_and_unjudged_runs_proposes_no_tuning(tmp_path, 
     assert says in said and "tune" not in said, said
 
 
-def test_run_of_another_family_has_no_verdict_on_the_files_own_settings(tmp_path):
-    assert sentence(imported(tmp_path, FOUR_BAR, TILTED), family="tuned") == ""
+def test_only_a_run_with_the_files_own_settings_has_a_verdict_on_them(tmp_path):
+    """The family "tuned" has settings of crosscheck's own."""
+    scene = imported(tmp_path, FOUR_BAR, TILTED)
+    assert sentence(scene) and sentence(scene, family="tuned") == ""
 
 
 def test_a_free_base_is_reported_with_the_option_that_holds_it(tmp_path):

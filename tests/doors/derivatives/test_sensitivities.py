@@ -52,6 +52,7 @@ def angle_of_pendulum(times, mass, inertia, x, y, gravity, start):
 
 
 def test_derivatives_of_a_pendulums_angle_equal_those_of_jacobis_function():
+    """``angle_of_pendulum`` is the closed form, differentiated by a complex step."""
     numbers = {"mass": 1.3, "inertia": 0.07, "x": 0.0, "y": 0.0, "gravity": -GRAVITY, "start": 0.0}
     paths = ["body[bob].mass", "body[bob].inertia[2]", "joint[A].anchor.x", "joint[A].anchor.y"]
     times = np.array([0.3, 1.7])
@@ -166,6 +167,7 @@ def test_equilibrium_of_a_pendulum_with_a_torsion_spring_moves_as_in_closed_form
 
 @pytest.mark.slow
 def test_derivative_in_other_units_is_scaled_by_the_units_of_output_and_number():
+    """A velocity by a length, in 1/s: where the numbers of times are a quarter, it is four times as large."""
     mass, length, time = 8.0, 0.5, 0.25
     scene, times = powered_mechanism(2), np.array([0.02, 0.05])
     column, number = f"{scene.body[0].name}.velocity", f"joint[{scene.joint[-1].name}].anchor.x"
@@ -218,6 +220,7 @@ def test_derivatives_end_undecided_at_a_singular_position():
 
 
 def test_command_prints_and_writes_the_derivatives_of_the_function(tmp_path, capsys):
+    """The derivative of the energy (J) by the start's rate (rad/s), as `mbref.sensitivities` returns it."""
     path, out, of, to = tmp_path / "pendulum.toml", tmp_path / "found.csv", "energy", "joint[A].rate(0)"
     pendulum().save(path)
     request = ["--of", of, "--to", to, "--times", "0.1,0.4", "--out", str(out), "--json"]

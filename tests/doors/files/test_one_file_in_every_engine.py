@@ -279,7 +279,8 @@ def test_unknown_reader_of_files_is_refused_with_the_nearest_name(tmp_path: Path
 
 
 def test_own_import_reads_public_files_of_robots_or_refuses_them_by_name():
-    """At least 60 files of 12 packages, without places of the machine that read them."""
+    """At least 60 files of 12 packages: the machine is the same except for limits and friction of joints, or
+    words refuse the file. They name no place of the machine that read them."""
     found = [record for record in public.read() if record["reader"] == "mbref"]
     assert len(found) >= 60 and len({record["package"] for record in found}) >= 12
     for record in found:

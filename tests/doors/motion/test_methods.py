@@ -22,10 +22,7 @@ INDEPENDENT = (
     "driven angle by a sine",
     "loop with inline",
 )
-REDUNDANT = {
-    "four hinges": 3,
-    "doubled hinge": 5,
-}  # redundant rows: 20 - 17 and 10 - 5
+REDUNDANT = {"four hinges": 3, "doubled hinge": 5}  # redundant rows: 20 - 17 and 10 - 5
 
 
 def errors(name: str, method: str, rtol: float = RTOL) -> tuple[float, float, mbref.Motion]:
