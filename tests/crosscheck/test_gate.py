@@ -132,8 +132,7 @@ def test_accelerations_at_a_singular_position_are_not_compared_along_the_run():
 
 
 def fault_in_single_precision(scene, run, rounding=2.0**-23):
-    """Return the field in which a run, with states rounded to 24 bits, differs from the exact motion, or
-    ""."""
+    """Return the field in which a run, rounded to 24 bits, differs from the exact motion, or ""."""
     names = ("position", "orientation", "velocity", "angular_velocity")
     rounded = {name: getattr(run, name).astype(np.float32).astype(float) for name in names}
     one = replace(run, engine="one", acceleration=None, angular_acceleration=None, **rounded)

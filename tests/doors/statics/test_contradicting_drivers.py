@@ -29,8 +29,7 @@ def test_commands_name_two_drivers_of_one_slide_whose_motions_differ(power, shar
     """One driver moves the slide by 3 t m, the other by 3 t + 3 share tⁿ m, n = 1, 2 or 4: velocities or
     accelerations differ at the start, or places later."""
     motion = [0.0, 3.0, 0.0, 0.0, 0.0]
-    other = list(motion)
-    other[power] += 3.0 * share
+    other = [number + 3.0 * share * (k == power) for k, number in enumerate(motion)]
     path = str(tmp_path / "twice.toml")
     twice_driven(motion, other).save(path)
     for command, status in COMMANDS.items():
