@@ -58,9 +58,8 @@ def replayed(*moments: float, **parts: Any) -> Scene | Outside:
 
 @pytest.mark.parametrize("size", [4.0, -4.0, 0.0])
 def test_constant_driving_moment_replaces_the_driver(size):
-    """Moments of ±4 or 0 N m about z at two samples vary by 0.9e-6 (1e-6 is allowed): their mean acts in
-    place of the driver. The axis's length of 2 has no effect. Other loads stay; bodies start with the run's
-    velocities."""
+    """Moments of ±4 or 0 N m about z vary by 0.9e-6 (1e-6 is allowed): their mean replaces the driver. The
+    axis's length of 2 has no effect. Other loads stay; bodies start with the run's velocities."""
     found = replayed(size, size * (1 + 0.9e-6), load=(Moment(body="c", moment=X),))
     assert [load.body for load in found.load] == ["c", "b"] and not found.driver
     assert found.load[1].moment == pytest.approx((0.0, 0.0, size * (1 + 0.45e-6)), rel=1e-9)
