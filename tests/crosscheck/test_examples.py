@@ -14,6 +14,7 @@ from crosscheck.judge.truth import truth_for
 from crosscheck.processes.pool import run_isolated
 from crosscheck.study.fair_timing import identity_cases, model_difference
 from crosscheck.study.grid import run_case
+from mbref.motions.trajectory import Outcome
 from mbref.scenes import SCENES
 
 ROOT = Path(__file__).parents[2]
@@ -50,6 +51,7 @@ def test_plug_in_simulates_the_scene_and_gives_its_true_motion(installed):
     assert [case.engine for case in cases] == ["tiny"] and found is None, found
     setting = cases[0].setting
     run = run_isolated("tiny", scene, np.linspace(0, 0.1, 5), setting, 60.0)
+    assert run.outcome is Outcome.COMPLETED, run.message
     error = measure(scene, run, truth_for(scene))["error"]
     assert error is not None and error < 1e-8, f"tiny at {setting}: error {error}"
 

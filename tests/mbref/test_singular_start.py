@@ -91,8 +91,9 @@ def test_slow_start_along_the_weight_falls_with_its_energy(rate):
 
 
 def test_slow_start_against_the_weight_is_undecided_at_its_singular_position():
-    """The weight stops it after ½ I ω² / m g l, about 1e-6 rad, from where it falls through the singular
-    position again."""
+    """The weight stops the cranks at φ = ½ I ω² / 2 m g l = 1.5e-6 rad, from where they fall through the
+    singular position again. Rounding, 2⁻⁵², changes the direction of velocities by 2⁻⁵² / φ² = 1e-4 there,
+    and so would choose the branch. The run tries a tight rtol, and branch 2 at its crossing 1, in vain."""
     run = simulate(falling_parallelogram(0.01), "taylor", np.linspace(0.0, 1.0, 9))
     assert run.outcome.name == "UNDECIDED" and run.t_end == 0.0 and not run.times.size
     assert run.message.endswith(

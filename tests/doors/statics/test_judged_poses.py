@@ -42,9 +42,12 @@ def test_pendulum_that_its_spring_just_holds_is_one_indifferent_equilibrium():
 
 
 def test_flat_parallelogram_at_a_singular_position_is_left_out_and_a_hanging_one_is_found():
-    """Gravity acts along the flat links, or down. A singular position has no small motions to judge."""
-    assert [each.stability for each in steady_poses(parallelogram(-0.96, 0.28), starts=1)] == ["stable"]
-    assert not steady_poses(parallelogram(0.0, 1.0).with_(gravity=(G, 0.0, 0.0)), starts=1)
+    """All links of the flat one lie along gravity, so that no moment moves its pose; but a singular position
+    has no small motions to judge. The other's cranks hang 13° from their equilibrium below the pivots."""
+    flat = parallelogram(angle_sine=0.0, angle_cosine=1.0).with_(gravity=(G, 0.0, 0.0))
+    assert not steady_poses(flat, starts=1)
+    hanging = parallelogram(angle_sine=-0.96, angle_cosine=0.28)
+    assert [each.stability for each in steady_poses(hanging, starts=1)] == ["stable"]
 
 
 def test_slow_fall_of_a_pendulum_is_found_beside_a_damper_millions_of_times_faster():
