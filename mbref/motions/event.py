@@ -1,4 +1,4 @@
-"""Event: a time at which joints or couplings begin or cease to constrain a motion."""
+"""Event: a time at which joints or couplings begin or cease to constrain a motion, or at an end stop."""
 
 from __future__ import annotations
 

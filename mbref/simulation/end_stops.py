@@ -86,10 +86,16 @@ class EndStops:
             elif side.joint not in {name.rpartition(".")[0] for name in contacts}:
                 value, rate = (self._part(side, turned, k) for k in (0, 1))
                 signals.append(Signal(value, rate, GAP_ROUNDED / GAP_CLOSED * self._least(side)))
-        return first_zero(lambda times: self._run(held, times), signals, end) if signals else None
+        if not signals:
+            return None
+        return first_zero(lambda times: self._run(held, times), signals, end, *laws(piece))
 
     def _part(self, side: Side, turned: Mapping[str, float], part: int) -> Callable[[Motion], np.ndarray]:
         return lambda motion: side.gap(self.scene, _counted(motion, turned))[part]
+
+    def touching(self, state: Trajectory) -> list[Side]:
+        """Return the sides at which the gaps of a state are closed."""
+        return [s for s in self.sides if s.gap(self.scene, state)[0][0] <= 10 * self._least(s)]
 
     def starts(self, state: Trajectory) -> bool:
         """Return whether a coordinate starts at an end; raises SceneError if it starts beyond one."""
@@ -104,7 +110,7 @@ class EndStops:
 
         ``before`` and ``after`` are the scenes of both pieces, at the poses of the state.
         """
-        touching = [s for s in self.sides if s.gap(self.scene, state)[0][0] <= 10 * self._least(s)]
+        touching = self.touching(state)
         rates = {side: float(side.gap(self.scene, state)[1][0]) for side in touching}
         speeds = (float(np.abs(x).max()) for x in (state.velocity, state.angular_velocity))
         still = AT_REST_RATE * max(1e-300, *speeds)
@@ -179,6 +185,15 @@ def _sides(scene: Scene) -> list[Side]:
                     Side(f"{joint.name}.{end}", joint.name, coordinate, limit, sign, stop.restitution)
                 )
     return found
+
+
+def laws(scene: Scene) -> tuple[list[float], float]:
+    """Return the times (s) after 0 at which a driver, or a load over time, changes its law, and the largest
+    frequency (rad/s) of their sines."""
+    functions = [*scene.driver, *(load.over_time for load in scene.load if load.over_time)]
+    knots = {piece.begin for each in functions for piece in each.pieces()}
+    sines = [each.sine.frequency for each in functions if each.sine]
+    return sorted(knots - {0.0}), max(map(abs, sines), default=0.0)
 
 
 def _counted(motion: Trajectory, turned: Mapping[str, float]) -> Trajectory:

@@ -1,5 +1,5 @@
-"""Motions with joints and couplings that come and go: one run for each piece between events, and the impacts
-between them."""
+"""Motions with joints and couplings that come and go, or with end stops: one run for each piece between
+events, and the impacts between them."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def simulate_pieces(
     branches, whose numbers count the singular positions of one piece.
     """
     if limits.branches:
-        raise InputError("branches: cannot be chosen in a scene whose joints or couplings have intervals")
+        raise InputError("branches: cannot be chosen in a scene with intervals or end stops")
     if not scene.has_mass():
         raise SceneError(missing_masses(scene))
     times = samples_at(times, event_times(scene, np.inf))
@@ -55,8 +55,9 @@ def simulate_pieces(
     piece, pieces, events, turned = first_piece(scene), [], [], dict[str, float]()
     contacts: tuple[str, ...] = ()
     if stops.sides and stops.starts(start := run(piece, np.zeros(1), None)):
-        piece, event = _event(scene, piece, (), _end(start, 0.0, turned), turned, stops)
-        contacts, events = event.contacts, [event]
+        after, event = _event(scene, piece, (), _end(start, 0.0, turned), turned, stops)
+        if event.stops or event.contacts:
+            piece, contacts, events = after, event.contacts, [event]
     while True:
         end = next((time for time in ends if time > begin), None)
         last = float(times[-1]) if end is None else end
@@ -117,7 +118,8 @@ def _event(
     except SceneError as fault:
         if engaged:
             raise cannot_hold(", ".join(engaged), t, fault.faults[0]) from None
-        raise SceneError([f"end stops: cannot be met at t = {t:.6g} s: {fault.faults[0]}"]) from None
+        names = ", ".join(side.name for side in stops.touching(state))
+        raise SceneError([f"end stops {names}: cannot be met at t = {t:.6g} s: {fault.faults[0]}"]) from None
     found = met.found
     event = Event(
         time=t,
@@ -129,7 +131,7 @@ def _event(
         **{key: getattr(state, key)[0] for key in STATE_BEFORE},
         velocity_after=found.velocity,
         angular_velocity_after=found.angular_velocity,
-        angles={joint.name: turned[joint.name] for joint in scene.joint if _is_counted(joint)},
+        angles={joint.name: turned.get(joint.name, 0.0) for joint in scene.joint if _is_counted(joint)},
         impulses={name: wrench * bool(engaged or met.hits) for name, wrench in found.impulses.items()},
         open=found.open,
         energy_before=found.energy[0],

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -10,7 +12,12 @@ from scipy.optimize import brentq
 
 from mbref.motions.motion import Motion
 
-GRID = 33  # samples of a window in which signals are followed
+GRID = 32  # intervals of a window in which signals are followed, an even number
+PER_STEP = 16  # intervals for each step of the run, which resolves the motion's oscillations
+PER_PERIOD = 32  # intervals for each period of a load over time, whose force may act on a body at rest
+MOST = 8192  # intervals, above which a window is shorter
+LEAST = 8  # intervals between two times at which a function of time changes its law
+JUMP = 1e-12  # time before such a change / longest time, at which a signal has its value before the change
 NODES = 13  # samples of an interval with a zero; their polynomial has an error near rounding
 CURVED = 0.02  # error of a cubic between samples / range of the signal, above which a window is shorter
 SHARPER = 0.25  # of such a window
@@ -35,14 +42,28 @@ class Signal(NamedTuple):
         return self.least if self.rate else PULL * float(np.abs(value).max(initial=0.0))
 
 
-def first_zero(run: Callable[[np.ndarray], Motion], signals: Sequence[Signal], end: float) -> float | None:
+def first_zero(
+    run: Callable[[np.ndarray], Motion],
+    signals: Sequence[Signal],
+    end: float,
+    knots: Sequence[float] = (),
+    frequency: float = 0.0,
+) -> float | None:
     """Return the first time (s), up to an end, at which a signal falls below zero; None without one, or if
-    the motion ends before. ``run`` returns the motion at increasing times (k,)."""
+    the motion ends before. ``run`` returns the motion at increasing times (k,). At ``knots`` (s) functions
+    of time change their law; ``frequency`` (rad/s) is the largest one of their sines."""
     begin, window = 0.0, end
     while begin < end:
         stop = min(begin + window, end)
-        motion = run(np.append(np.linspace(begin, stop, GRID)[:-1], stop))
-        if window > LEAST_WINDOW * end and any(_is_coarse(motion, signal) for signal in signals):
+        count = max(GRID, math.ceil(PER_PERIOD * frequency * (stop - begin) / (2 * math.pi)))
+        times = _times(begin, stop, knots, min(count, MOST), JUMP * end)
+        motion = run(times)
+        count = max(count, math.ceil(PER_STEP * motion.cost.steps * (stop - begin) / stop))
+        if len(times) <= count <= MOST:
+            times = _times(begin, stop, knots, count, JUMP * end)
+            motion = run(times)
+        is_coarse = count > MOST or any(_is_coarse(motion, signal) for signal in signals)
+        if is_coarse and window > LEAST_WINDOW * end:
             window *= SHARPER
             continue
         found = [_first(run, motion, signal) for signal in signals]
@@ -53,18 +74,30 @@ def first_zero(run: Callable[[np.ndarray], Motion], signals: Sequence[Signal], e
             window /= GRID
         elif zeros:
             return min(zeros)
-        elif len(motion.times) < GRID:
+        elif len(motion.times) < len(times):
             return None
         else:
             begin, window = stop, 2 * window
     return None
 
 
+def _times(begin: float, stop: float, knots: Sequence[float], count: int, jump: float) -> np.ndarray:
+    """Return times of about ``count`` intervals, in pairs of equal ones, and of two last ones of ``jump`` (s)
+    before each knot."""
+    cuts = [begin, *(knot for knot in knots if begin + 4 * jump < knot < stop), stop]
+    parts = []
+    for first, last in itertools.pairwise(cuts):
+        pairs = max(LEAST // 2, math.ceil(count * (last - first) / (stop - begin) / 2))
+        before = [last - jump] if last < stop else []
+        parts.append([*np.linspace(first, last - 2 * jump * len(before), 2 * pairs + 1), *before])
+    return np.concatenate(parts)
+
+
 def _is_coarse(motion: Motion, signal: Signal) -> bool:
     """Return whether samples are too far apart to follow a signal by cubic polynomials."""
-    if not signal.rate or len(motion.times) < GRID:
+    if not signal.rate or len(motion.times) < 3 or not len(motion.times) % 2:
         return False
-    value, rate, step = signal.value(motion), signal.rate(motion), motion.times[2] - motion.times[0]
+    value, rate, step = signal.value(motion), signal.rate(motion), motion.times[2::2] - motion.times[:-2:2]
     between = (value[:-2:2] + value[2::2]) / 2 + step / 8 * (rate[:-2:2] - rate[2::2])
     return bool(np.abs(between - value[1::2]).max() > CURVED * np.ptp(value) + signal.least)
 
@@ -94,6 +127,8 @@ def _between(
     run: Callable[[np.ndarray], Motion], signal: Signal, floor: float, begin: float, end: float
 ) -> float | None:
     """Return the first time (s) in an interval at which a signal falls below zero, FROM_ZERO, or None."""
+    if end - begin <= 2 * JUMP * end:
+        return end
     places = -np.cos(np.pi * np.arange(NODES) / (NODES - 1))
     nodes = begin + (end - begin) * (places + 1) / 2
     nodes[-1] = end

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
@@ -30,7 +32,10 @@ from mbref.scene import Scene
 Run = Callable[[Scene, np.ndarray], Motion]  # of a piece, at increasing times (k,), s
 Moved = Mapping[str, np.ndarray]  # angle (rad) and displacement (m) (2,) since t = 0, by joint
 FIELDS = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
-SAMPLES = 129  # of a piece, between which a gap closes at most once
+SAMPLES = 129  # least number of a piece, between which a gap closes at most once
+PER_STEP, PER_PERIOD = 8, 32  # samples for each step of the reference, and period of a function of time
+BETWEEN = 9  # samples from one change of a function's law to the next
+BEFORE = 1e-12  # time before such a change / its time, at which forces have their values before it
 STEPS = 12  # of a search for a time, each of which doubles its digits or halves its interval
 SOONEST = 1e-10  # of the longest time, below which an event is at the beginning
 AFTER = 1e-6  # time / end time, at which the force of a contact has its sign
@@ -48,7 +53,7 @@ class Bounces:
         signals = [end for end in self.ends if self._acts(end, contacts)]
         whole, window = held(piece, contacts), left
         while signals:
-            found = self._run(whole, np.linspace(0.0, window, SAMPLES))
+            found = self._followed(whole, window)
             values = self._signals(whole, signals, contacts, moved, found)
             floors = self._floors(piece, signals, contacts, values)
             below = values < -floors
@@ -68,6 +73,21 @@ class Bounces:
                 return None
             window = min(16 * window, left)
         return None
+
+    def _followed(self, piece: Scene, window: float) -> Motion:
+        """Return the motion up to a time (s), at samples that resolve its steps and the functions of time."""
+        functions = [*piece.driver, *(load.over_time for load in piece.load if load.over_time)]
+        knots = {each.begin for function in functions for each in function.pieces()}
+        cuts = [0.0, *sorted(knot for knot in knots if 0.0 < knot < window), window]
+        parts = [np.linspace(a, b, BETWEEN) for a, b in itertools.pairwise(cuts)]
+        parts.append(np.array(cuts[1:-1]) * (1 - BEFORE))
+        frequency = max((abs(each.sine.frequency) for each in functions if each.sine), default=0.0)
+        count = max(SAMPLES, math.ceil(PER_PERIOD * frequency * window / (2 * math.pi)))
+        found = self._run(piece, np.unique([*np.concatenate(parts), *np.linspace(0.0, window, count)]))
+        if PER_STEP * found.steps <= count:
+            return found
+        even = np.linspace(0.0, window, PER_STEP * found.steps)
+        return self._run(piece, np.unique([*np.concatenate(parts), *even]))
 
     def _acts(self, end: End, contacts: Collection[str]) -> bool:
         """Return whether an end is in contact, or may be met because no end of its joint is in contact."""

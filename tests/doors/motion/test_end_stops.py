@@ -1,5 +1,7 @@
 """End stops with restitution: closed forms, contacts, chatter, the judge's own events, refusals."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -147,3 +149,38 @@ def test_stop_is_refused_at_a_driven_joint_in_a_diagnosis_and_by_an_engine_witho
     with pytest.raises(SceneError, match=r"joint\[A\]\.stop: only motions have intervals and stops"):
         mbref.diagnose(door())
     assert "joint 'A' has an end stop" in str(engine("mujoco").supports.missing(door()))
+
+
+def held_by_its_weight(duration: float, force: dict[str, Any]) -> Scene:
+    """A mass of 1 kg on its stop, with a weight of 1 N and a force along the slide."""
+    joint = slide("S", "ground", "a", ORIGIN, Z, stop={"lower": 0.0})
+    load = {"type": "joint_force", "joint": "S", **force}
+    mass = body("a", 1.0, [0.1] * 3, ORIGIN)
+    down = (0.0, 0.0, -1.0)
+    return Scene(name="held", gravity=down, duration=duration, body=[mass], joint=[joint], load=[load])
+
+
+def test_short_pull_lifts_a_mass_off_its_stop():
+    """50 N from 0.41 s to 0.42 s, a hundredth of the run: 49 · 0.01 m/s at 0.42 s, then 1 m/s² less."""
+    scene = held_by_its_weight(0.8, {"force": 50.0, "factor": {"start": 0.41, "stop": 0.42}})
+    motion = mbref.simulate(scene, "taylor", times=[0.0, 0.8])
+    assert abs(motion.events[-1].time - 0.41) <= 1e-11
+    assert abs(motion.velocity[-1, 0, 2] - (0.49 - 0.38)) <= 1e-10
+
+
+@pytest.mark.parametrize("duration", [0.02, 0.2])
+def test_first_pull_of_a_fast_force_ends_the_contact_in_runs_of_any_length(duration):
+    """5 sin(80 π t) N exceeds the weight first at asin(1/5) / 80 π, about 0.8 ms."""
+    sine = {"polynomial": [0.0], "sine": {"amplitude": 1.0, "frequency": 80 * np.pi}}
+    scene = held_by_its_weight(duration, {"force": 5.0, "factor": sine})
+    motion = mbref.simulate(scene, times=[0.0, duration])
+    assert abs(motion.events[1].time - np.arcsin(0.2) / (80 * np.pi)) <= ROUNDED
+
+
+def test_rod_that_starts_at_the_end_of_its_range_leaves_it_without_an_event():
+    """Its upper end is its start, and it falls from there to -1 rad with I ω² / 2 = m g l sin 1."""
+    stop = {"lower": -1.0, "upper": 0.0, "restitution": 0.5}
+    joint = hinge("A", "ground", "rod", ORIGIN, Z, stop=stop)
+    (event,) = mbref.simulate(door().with_(joint=[joint]), "taylor", times=[0.0, 0.5]).events
+    speed = np.sqrt(2 * 2.0 * G * 0.5 * np.sin(1.0) / 0.7)
+    assert event.stops == ("A.lower",) and abs(event.angular_velocity_after[0, 2] - speed / 2) <= 1e-10
