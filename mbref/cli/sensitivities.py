@@ -50,8 +50,8 @@ def add(commands: Any) -> None:
         action=_fit,
         help="numbers of a scene from measured columns of its motion",
         description="Least squares over numbers of a scene, by exact derivatives: finds the motion that is\n"
-        "nearest to measured columns, each relative to its deviation. Prints the numbers with standard\n"
-        "errors, and the combinations of numbers that the columns do not determine.",
+        "nearest to measured columns, each relative to its standard deviation. Prints the numbers with\n"
+        "standard errors, and the combinations of numbers that the columns do not determine.",
         epilog="example:\n"
         "  mbref fit my.toml run.csv --free 'body[rod].mass' --free 'joint[B].anchor.x' --out fitted.toml",
     )
@@ -60,7 +60,9 @@ def add(commands: Any) -> None:
     match.add_argument(
         "--free", action="append", required=True, metavar="NUMBER", help="number to fit; may be repeated"
     )
-    match.add_argument("--of", metavar="NAME,…", help="columns to use, or their beginnings (default: all)")
+    match.add_argument(
+        "--of", metavar="NAME,…", help="columns to use, or their beginnings (default: all with derivatives)"
+    )
     add_output(match, "--out", metavar="FILE.toml", help="write the scene with the fitted numbers")
     match.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
 
@@ -125,6 +127,8 @@ def _fit(options: argparse.Namespace) -> int:
         parts = " ".join(f"{weight:+.3g} ({name})" for name, weight in combination.items())
         lines.append(f"not determined, in relative changes: {parts}")
     lines += [f"root mean square residual of {name}: {x:.3g}" for name, x in found.deviations.items()]
+    if found.left_out:
+        lines.append(f"left out, without a derivative: {', '.join(found.left_out)}")
     lines += ["the iteration ended before a minimum"] * (not found.converged)
     console().print("\n".join(lines), soft_wrap=True)
     return 0 if found.converged else 1

@@ -199,8 +199,9 @@ def chosen(columns: Mapping[str, Any] | Sequence[str], names: Sequence[str]) -> 
 
 
 def quantity_of(column: str) -> str:
-    """Return the quantity of a column: ``position`` of ``rod.position.x``, ``angle`` of ``A.angle``."""
-    return next(part for part in reversed(column.split(".")) if part in UNIT_OF)
+    """Return the quantity of a column: ``position`` of ``rod.position.x``, ``angle`` of ``A.angle``; empty if
+    the name has none."""
+    return next((part for part in reversed(column.split(".")) if part in UNIT_OF), "")
 
 
 def _hint(columns: Sequence[str], name: str) -> str:

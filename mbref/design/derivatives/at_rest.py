@@ -95,6 +95,9 @@ def _solved(request: DerivativeRequest, motion: Motion, precision: Precision) ->
     angles = np.zeros((1, len(model.structure.places.turning)))
     state = States(np.zeros(1), start.q[None], none[0], angles, *none)
     rows = TangentRows(model, state)
+    driven = np.abs(rows.least(rows.terms.gamma)).max(initial=0.0) * request.scene.duration**2
+    if driven > AT_BALANCE:  # displacement in the scene's duration
+        raise InputError(f"{request.scene.name}: is not in equilibrium; a driver accelerates it")
     state = with_accelerations(model, state, rows)
     chosen = independent_displacements(rows.free[0])[None]
     found, f = tangents_at(model, state, rows, chosen, numbers, step), rows.free.shape[2]

@@ -37,16 +37,22 @@ def differentiable(motion: Motion, names: Sequence[str]) -> list[str]:
     Raises InputError for a column without derivatives, and for a reaction that redundant constraints share.
     """
     found = chosen(motion.columns(), names)
-    needs_reactions = any(quantity_of(column) in FORCES for column in found if column != "time")
-    shared = _shared(motion) if needs_reactions else set()
-    for column in found:
-        if column == "time" or quantity_of(column) in WITHOUT_DERIVATIVE:
-            raise InputError(f"of: {column!r} has no derivative")
-        if column in shared:
-            raise InputError(
-                f"of: {column!r}: redundant constraints share it, and equilibrium does not determine it"
-            )
+    for column, reason in without_derivative(motion, found).items():
+        raise InputError(f"of: {column!r} {reason}")
     return found
+
+
+def without_derivative(motion: Motion, columns: Sequence[str]) -> dict[str, str]:
+    """Return the columns of a motion that have no derivative, with reasons."""
+    plain = [name for name in columns if name != "time" and quantity_of(name) not in WITHOUT_DERIVATIVE]
+    needs_reactions = any(quantity_of(name) in FORCES for name in plain)
+    shared = _shared(motion) if needs_reactions else set()
+    because = "has no derivative: redundant constraints share it, and equilibrium does not determine it"
+    return {
+        name: because if name in plain else "has no derivative"
+        for name in columns
+        if name not in plain or name in shared
+    }
 
 
 def _shared(motion: Motion) -> set[str]:

@@ -102,6 +102,7 @@ def unit_of_number(scene: Scene, label: str) -> str:
     field = fields[-1]
     if field not in UNITS_OF_TURNS:
         return UNITS.get(field, "")
+    number_at(scene, label)
     slides = _at(scene, label.rpartition(".")[0]).type in ("spring", "slide_spring", "translational")
     return (UNITS_OF_SLIDES if slides else UNITS_OF_TURNS)[field]
 
@@ -112,6 +113,15 @@ def number_at(scene: Scene, path: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise SceneError([f"{path}: the scene has no number at this path"])
     return float(value)
+
+
+def is_same_number(scene: Scene, path: str, other: str) -> bool:
+    """Return whether two paths lead to one number of a scene; raises SceneError if one does not exist."""
+    mark = object()
+    found: list[Any] = []
+    fields = {field: getattr(scene, field) for field in Scene.model_fields}
+    replaced_at(replaced_at(fields, path, lambda _: mark), other, found.append)
+    return found[0] is mark
 
 
 def _at(scene: Scene, path: str) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,12 @@ import numpy as np
 
 from mbref.design.derivatives.columns import Columns, differentiable
 from mbref.design.derivatives.followed import Followed
-from mbref.design.derivatives.numbers_of_scene import SceneNumber, scene_number, unit_of_number
+from mbref.design.derivatives.numbers_of_scene import (
+    SceneNumber,
+    is_same_number,
+    scene_number,
+    unit_of_number,
+)
 from mbref.design.derivatives.panels import Precision, gauss
 from mbref.design.derivatives.result import Sensitivities
 from mbref.design.derivatives.start_numbers import StartNumber, is_of_start, start_number
@@ -106,9 +112,22 @@ def _refuse(scene: Scene, of: Sequence[str], to: Sequence[str]) -> None:
     """Raise InputError for scenes without derivatives, and for a request without outputs or numbers."""
     if is_intermittent(scene):
         raise InputError(f"{scene.name}: intervals (`active`) and end stops have no derivatives here")
-    for name, given in (("of", of), ("to", to)):
-        if isinstance(given, str) or not len(given):
-            raise InputError(f"{name}: needs a list of one name at least")
+    _refuse_no_list("of", of)
+    refuse_repeats(scene, "to", to)
+
+
+def _refuse_no_list(name: str, given: Sequence[str]) -> None:
+    if isinstance(given, str) or not len(given):
+        raise InputError(f"{name}: needs a list of one name at least, got {given!r}")
+
+
+def refuse_repeats(scene: Scene, name: str, labels: Sequence[str]) -> None:
+    """Raise InputError unless labels are a list, and for a number of the scene that is given twice."""
+    _refuse_no_list(name, labels)
+    for label, other in itertools.combinations(labels, 2):
+        of_start = is_of_start(label) or is_of_start(other)
+        if label == other or (not of_start and is_same_number(scene, label, other)):
+            raise InputError(f"{name}: {label} and {other} are one number; give it once")
 
 
 class Derivatives(NamedTuple):

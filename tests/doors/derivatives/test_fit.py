@@ -38,3 +38,11 @@ def test_command_names_the_combination_that_an_angle_does_not_determine(tmp_path
     printed = capsys.readouterr().out.replace("-0.707", "+0.707")
     assert "+0.707 (body[bob].mass) +0.707 (body[bob].inertia[2])" in printed
     assert printed.count("standard error inf") == 2
+
+
+def test_constant_column_counts_no_more_than_others():
+    """The standard deviation of equal numbers is rounding, such as 1e-17."""
+    times, wrong = np.array([0.1, 0.2, 0.3]), pendulum().with_("body[bob].mass", 1.5)
+    columns = mbref.simulate(pendulum(), times=times).columns("A.angle")
+    found = mbref.fit(wrong, {**columns, "bob.position.z": np.full(3, 0.1)}, ["body[bob].mass"])
+    assert found.numbers["body[bob].mass"] == pytest.approx(1.3, rel=1e-6)

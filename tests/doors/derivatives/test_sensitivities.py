@@ -150,19 +150,21 @@ def test_derivative_of_a_conserved_energy_stays_the_one_at_the_start():
 
 def test_equilibrium_of_a_pendulum_with_a_torsion_spring_moves_as_in_closed_form():
     """k φ = m g l cos φ with k = 10 N m/rad, m = 1.3 kg, l = 0.5 m: dφ/dk = -φ/(k + m g l sin φ)."""
-    bob, spring = (
-        body("bob", 1.3, [0.05, 0.06, 0.07], (0.5, 0.0, 0.0)),
-        {"type": "torsion_spring", "joint": "A"},
-    )
-    scene = pendulum().with_(body=[bob], load=[{**spring, "stiffness": 10.0}])
-    rest = mbref.equilibria(scene, starts=1)[0].scene
+    bob = body("bob", 1.3, [0.05, 0.06, 0.07], (0.5, 0.0, 0.0))
+    spring = {"type": "torsion_spring", "joint": "A", "stiffness": 10.0}
+    rest = mbref.equilibria(pendulum().with_(body=[bob], load=[spring]), starts=1)[0].scene
     moment, angle = 1.3 * GRAVITY, -np.arctan2(rest.body[0].position[1], rest.body[0].position[0])
-    found = mbref.equilibrium_sensitivities(
-        rest, ["A.angle", "A.force.y"], ["load[0].stiffness", "gravity.y"]
-    )
+    of, to = ["A.angle", "A.force.y"], ["load[0].stiffness", "gravity.y"]
+    found = mbref.equilibrium_sensitivities(rest, of, to)
     slope = 10.0 + 0.5 * moment * np.sin(angle)
     true = [[angle / slope, 0.5 * 1.3 * np.cos(angle) / slope], [0.0, -1.3]]
     assert_close(found.values[0], np.array(true))
+
+
+def test_driven_linkage_that_accelerates_from_rest_is_not_in_equilibrium():
+    scene = crank_linkage(ROCKER).with_(driver=[{"joint": "A", "polynomial": [0.0, 0.0, 1.0]}])
+    with pytest.raises(mbref.InputError, match="is not in equilibrium"):
+        mbref.equilibrium_sensitivities(scene, ["B.force"], ["body[last].mass"])
 
 
 @pytest.mark.slow
@@ -200,15 +202,17 @@ def test_derivative_of_a_random_mechanism_equals_differences_of_the_judges_refer
         (pendulum(), "A.open", "body[bob].mass", "no derivative"),
         (pendulum(), "A.angle", "body[bob].name", "no number at this path"),
         (pendulum(), "A.angle", "/7", "no number at this path"),
+        (pendulum(), "A.angle", "load[7].stiffness", r"load\[7\]\.stiffness: "),
+        (pendulum(), "A.angle", "gravity.y gravity[1]", "are one number"),
         (pendulum(), "A.angle", "joint[A].displacement(0)", "no joint 'A' with this coordinate"),
         (crank_linkage(ROCKER), "B.angle", "joint[A].angle(0)", "drivers prescribe the whole motion"),
         (crank_linkage(ROCKER), "B.angle", "joint[B].axis.x", "cannot stay closed"),
     ],
-    ids=["output", "text", "no field", "coordinate", "driven", "tilted hinge of a planar loop"],
+    ids=["output", "text", "no field", "no load", "twice", "coordinate", "driven", "tilted hinge"],
 )
 def test_output_or_number_without_a_derivative_is_refused_by_name(scene, of, to, reason):
     with pytest.raises((mbref.InputError, mbref.SceneError), match=reason):
-        mbref.sensitivities(scene, [of], [to], [0.1])
+        mbref.sensitivities(scene, [of], to.split(), [0.1])
 
 
 def test_derivatives_end_undecided_at_a_singular_position():
