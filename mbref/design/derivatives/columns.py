@@ -9,7 +9,7 @@ import numpy as np
 
 from mbref.design.derivatives.numbers_of_scene import SceneNumber
 from mbref.design.derivatives.states import Direction, States, terms_along
-from mbref.design.differences import CENTRAL
+from mbref.design.differences import directional_derivative
 from mbref.equations.joint_angles import angles_at
 from mbref.equations.joint_reactions import reactions
 from mbref.equations.model import Model
@@ -105,27 +105,26 @@ class Columns:
 
     def along(self, model: Model, states: States, direction: Direction) -> tuple[np.ndarray, np.ndarray]:
         """Return the derivative (k, columns) along a direction of states, and its rounding."""
-        scene, steps = self.motion.mechanism, direction.steps(states, model, self.step)[:, None]
-        total, largest = np.zeros((states.times.size, len(self.names))), np.zeros(len(self.names))
-        for k, weight in enumerate(CENTRAL, 1):
-            for sign in (1.0, -1.0):
-                found = self.at(scene, model, states.moved(direction, sign * k * steps[:, 0]))
-                total += sign * weight * found
-                largest = np.maximum(largest, np.abs(found).max(axis=0, initial=0.0))
-        return total / steps, EPSILON * self._largest(largest) / steps
+        steps, largest = direction.steps(states, model, self.step), np.zeros(len(self.names))
+
+        def at(h: np.ndarray) -> np.ndarray:
+            return self._noted(largest, self.motion.mechanism, model, states.moved(direction, h))
+
+        change, apart = directional_derivative(at, steps), steps[:, None]
+        return change / apart, EPSILON * self._largest(largest) / apart
 
     def by_number(self, number: SceneNumber, states: States) -> tuple[np.ndarray, np.ndarray]:
         """Return the derivative (k, columns) by a number at equal states, and its rounding."""
         largest = np.zeros(len(self.names))
-
-        def at(scene: Scene, model: Model) -> np.ndarray:
-            found = self.at(scene, model, states)
-            np.maximum(largest, np.abs(found).max(axis=0, initial=0.0), out=largest)
-            return found
-
-        derivative = number.derivative(at)
+        derivative = number.derivative(lambda scene, model: self._noted(largest, scene, model, states))
         rounding = EPSILON * self._largest(largest) * np.abs(number.weights).max()
         return derivative, rounding * np.ones_like(derivative)
+
+    def _noted(self, largest: np.ndarray, scene: Scene, model: Model, states: States) -> np.ndarray:
+        """Return the columns at states, and update the largest values (columns,) in place."""
+        found = self.at(scene, model, states)
+        np.maximum(largest, np.abs(found).max(axis=0, initial=0.0), out=largest)
+        return found
 
     def _largest(self, values: np.ndarray) -> np.ndarray:
         """Return the largest of values (columns,) of one quantity, whose components round alike."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mbref import rotations
-from mbref.design.differences import CENTRAL
+from mbref.design.differences import directional_derivative
 from mbref.equations.coordinates import displace_all
 from mbref.equations.model import Model, Terms
 from mbref.kernels.scene_layout import SPRING
@@ -125,8 +125,5 @@ def change_along(model: Model, states: States, along: Direction, step: float) ->
     if not along.x.any():  # residuals are polynomials of degree 2 in v
         ahead, behind = (residuals(model, states.moved(along, sign * steps)) for sign in (1.0, -1.0))
         return (ahead - behind) / (2.0 * steps[:, None])
-    total = np.zeros((len(states.times), 3 * model.m + model.n))
-    for k, weight in enumerate(CENTRAL, 1):
-        for sign in (1.0, -1.0):
-            total += sign * weight * residuals(model, states.moved(along, sign * k * steps))
-    return np.asarray(total / steps[:, None])
+    change = directional_derivative(lambda h: residuals(model, states.moved(along, h)), steps)
+    return np.asarray(change / steps[:, None])
