@@ -152,10 +152,12 @@ def _columns(measured: Mapping[str, np.ndarray] | str | Path) -> dict[str, np.nd
     if not isinstance(measured, Mapping):
         with open(measured, encoding="utf-8-sig", newline="") as file:
             names, *rows = [*csv.reader(file)] or [[]]
+        if uneven := [k for k, row in enumerate(rows, 1) if len(row) != len(names)]:
+            raise InputError(f"{measured}: row {uneven[0]} of the numbers needs {len(names)} of them")
         try:
             table = np.array(rows, dtype=float).reshape(len(rows), len(names))
-        except ValueError:
-            raise InputError(f"{measured}: must have a line of names, and lines of as many numbers") from None
+        except ValueError as fault:
+            raise InputError(f"{measured}: needs a line of names, and lines of numbers: {fault}") from None
         for name in names:
             if names.count(name) > 1:
                 raise InputError(f"{measured}: has the column {name!r} twice; remove one")
