@@ -1,18 +1,22 @@
 """Processes that each make one call after another; a killed process fails its own call only.
 
-Each process is a ProcessPoolExecutor with one worker, because a pool of several workers fails all submitted
-calls if one of its processes is killed.
+Each process answers through a pipe that no other process can write to. The standard library's pool reads
+from a queue that its own process may also write to, so that it waits for ever for the rest of an answer
+whose process was killed while it wrote.
 """
 
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import threading
 from collections.abc import Callable
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import Pipe, get_context, parent_process
 from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
 from queue import SimpleQueue
 from types import TracebackType
 from typing import Any
@@ -24,9 +28,9 @@ class Processes(Executor):
     def __init__(self, workers: int) -> None:
         self._threads = ThreadPoolExecutor(workers)
         self._end, self._open = Pipe(duplex=False)  # the processes end when the second one is closed
-        self._idle: SimpleQueue[ProcessPoolExecutor] = SimpleQueue()
+        self._idle: SimpleQueue[_Process] = SimpleQueue()
         for _ in range(workers):
-            self._idle.put(self._process())
+            self._idle.put(_Process(self._end))
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
         """Return the future of a call; if its process is killed, its exception is BrokenExecutor."""
@@ -36,7 +40,7 @@ class Processes(Executor):
         """End the processes after their calls."""
         self._threads.shutdown(wait, cancel_futures=cancel_futures)
         while not self._idle.empty():
-            self._idle.get().shutdown(wait)
+            self._idle.get().end()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -49,23 +53,69 @@ class Processes(Executor):
     def _call(self, function: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
         process = self._idle.get()
         try:
-            return process.submit(function, *arguments, **named).result()
+            return process.call((function, arguments, named))
         except BrokenExecutor:
-            process.shutdown(wait=False)
-            process = self._process()
+            process.end()
+            process = _Process(self._end)
             raise
         finally:
             self._idle.put(process)
 
-    def _process(self) -> ProcessPoolExecutor:
-        """Return a process that makes one call after another, and that starts with its first call."""
-        return ProcessPoolExecutor(1, get_context("spawn"), _begin, (self._end,))
+
+class _Process:
+    """A process that makes one call after another, and that starts with its first call."""
+
+    def __init__(self, end: Connection[Any, Any]) -> None:
+        self._end = end
+        self._pipe: Connection[Any, Any] | None = None
+        self._process: BaseProcess | None = None
+
+    def call(self, job: tuple[Any, ...]) -> Any:
+        """Return the result of a call, or raise its exception, BrokenProcessPool if the process ends."""
+        pipe = self._pipe or self._started()
+        try:
+            pipe.send_bytes(pickle.dumps(job))
+            succeeded, value = pipe.recv()
+        except (EOFError, OSError):
+            raise BrokenProcessPool("the process was killed") from None
+        if succeeded:
+            return value
+        raise value
+
+    def _started(self) -> Connection[Any, Any]:
+        context = get_context("spawn")
+        pipe, of_process = context.Pipe()
+        process = context.Process(target=_serve, args=(of_process, self._end), daemon=True)
+        process.start()
+        of_process.close()
+        self._pipe, self._process = pipe, process
+        return pipe
+
+    def end(self) -> None:
+        """End the process, which makes no call."""
+        if self._pipe and self._process:
+            self._pipe.close()
+            self._process.join()
 
 
-def _begin(end: Connection[Any, Any]) -> None:
-    """Leave interrupts to the parent process, and end when it has ended or closed its side of a pipe."""
+def _serve(pipe: Connection[Any, Any], end: Connection[Any, Any]) -> None:
+    """Answer calls until the parent closes its side of the pipe; leave interrupts to the parent process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, args=(end,), daemon=True).start()
+    while True:
+        try:
+            function, arguments, named = pipe.recv()
+        except EOFError:
+            return
+        pipe.send_bytes(_answer(function, arguments, named))
+
+
+def _answer(function: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> bytes:
+    """Return whether a call succeeds, and its result or exception, as bytes."""
+    try:
+        return pickle.dumps((True, function(*arguments, **named)))
+    except Exception as fault:
+        return pickle.dumps((False, fault))
 
 
 def _end_with_parent(end: Connection[Any, Any]) -> None:
