@@ -226,15 +226,6 @@ def test_angle_beyond_a_turn_is_a_probable_slip_of_degrees():
     ]
 
 
-@pytest.mark.parametrize(("phase", "count"), [(180.0, 1), (-180.0, 1), (6.2, 0), (-6.2, 0)])
-def test_phase_beyond_a_turn_is_a_probable_slip_of_degrees(phase, count):
-    """The driver's polynomial −sin(phase) lets its angle begin at 0."""
-    sine = {"amplitude": 1.0, "frequency": 2.0, "phase": phase}
-    driver = {"joint": "A", "polynomial": [-math.sin(phase)], "sine": sine}
-    slips = probable_slips(find_scene("four_bar").with_(driver=(driver,)))
-    assert [slip.split(": ")[0] for slip in slips] == ["driver[A].sine.phase"] * count
-
-
 @pytest.mark.parametrize(("rate", "count"), [(720.0, 1), (-90.0, 1), (124.8, 0), (6.0, 0), (0.0, 0)])
 def test_rate_of_whole_quarters_of_a_turn_is_a_probable_slip_of_degrees(rate, count):
     """720 and -90 are whole multiples of 90 other than zero; 124.8, 6 and 0 rad/s are not."""
