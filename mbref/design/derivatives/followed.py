@@ -22,7 +22,7 @@ RESOLVED = 1e-10
 RESOLVED_BASIS = 1e-8  # the same of displacements by the independent ones
 STEPS_OF_PANEL = 4  # steps of the run for each of the first panels, of which those too long are bisected
 MOST_PANELS = 20_000  # a limit of memory and time
-WEAK = 0.1  # least singular value of the chosen rows of a basis, below which a panel is bisected
+WEAK = 0.1  # smallest singular value of the chosen rows of a basis, below which a panel is bisected
 
 
 @dataclass(frozen=True)
