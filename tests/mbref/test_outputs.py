@@ -202,6 +202,7 @@ def test_gif_of_a_short_motion_plays_four_seconds(tmp_path):
     assert len(lasts) == 7 and sum(lasts) == 4000
 
 
+@pytest.mark.slow
 def test_animation_is_written_as_mp4(tmp_path):
     pytest.importorskip("imageio_ffmpeg", reason="the extra video writes MP4")
     path = tmp_path / "my.toml"

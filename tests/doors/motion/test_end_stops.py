@@ -20,6 +20,7 @@ from tests.helpers.parts import X, Z, hinge, slide
 G, ORIGIN = 10.0, (0.0, 0.0, 0.0)
 ROUNDED = 1e-13  # of times, places and velocities of about 1 s, m and m/s
 BY_STEPS = 1e-10  # of methods whose steps have the default tolerance
+STEPPED = pytest.param("alf-dual+projection/dop853", BY_STEPS, marks=pytest.mark.slow)
 
 
 def ball(restitution: float, duration: float) -> Scene:
@@ -50,7 +51,7 @@ def pushed() -> Scene:
     return Scene(name="pushed", duration=2.0, body=[mass], joint=[joint], load=[force])
 
 
-@pytest.mark.parametrize(("method", "close"), [("taylor", ROUNDED), ("alf-dual+projection/dop853", BY_STEPS)])
+@pytest.mark.parametrize(("method", "close"), [("taylor", ROUNDED), STEPPED])
 def test_bounces_follow_each_other_in_a_geometric_series(method, close):
     """t₀ = √(2 h / g), then flights 2 eᵏ t₀; impulses m (1 + e) eᵏ⁻¹ g t₀; kinetic energies fall by e²."""
     e, t0 = 0.5, np.sqrt(2 / G)
@@ -154,10 +155,9 @@ def test_stop_is_refused_at_a_driven_joint_in_a_diagnosis_and_by_an_engine_witho
 def held_by_its_weight(duration: float, force: dict[str, Any]) -> Scene:
     """A mass of 1 kg on its stop, with a weight of 1 N and a force along the slide."""
     joint = slide("S", "ground", "a", ORIGIN, Z, stop={"lower": 0.0})
-    load = {"type": "joint_force", "joint": "S", **force}
-    mass = body("a", 1.0, [0.1] * 3, ORIGIN)
-    down = (0.0, 0.0, -1.0)
-    return Scene(name="held", gravity=down, duration=duration, body=[mass], joint=[joint], load=[load])
+    load, mass = {"type": "joint_force", "joint": "S", **force}, body("a", 1.0, [0.1] * 3, ORIGIN)
+    scene = Scene(name="held", duration=duration, body=[mass], joint=[joint], load=[load])
+    return scene.with_(gravity=(0.0, 0.0, -1.0))
 
 
 def test_short_pull_lifts_a_mass_off_its_stop():
@@ -172,8 +172,8 @@ def test_short_pull_lifts_a_mass_off_its_stop():
 def test_first_pull_of_a_fast_force_ends_the_contact_in_runs_of_any_length(duration):
     """5 sin(80 π t) N exceeds the weight first at asin(1/5) / 80 π, about 0.8 ms."""
     sine = {"polynomial": [0.0], "sine": {"amplitude": 1.0, "frequency": 80 * np.pi}}
-    scene = held_by_its_weight(duration, {"force": 5.0, "factor": sine})
-    motion = mbref.simulate(scene, times=[0.0, duration])
+    push = {"force": 5.0, "factor": sine}
+    motion = mbref.simulate(held_by_its_weight(duration, push), times=[0.0, duration])
     assert abs(motion.events[1].time - np.arcsin(0.2) / (80 * np.pi)) <= ROUNDED
 
 

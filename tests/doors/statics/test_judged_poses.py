@@ -24,6 +24,7 @@ def balance_of_weights() -> Scene:
     )
 
 
+@pytest.mark.slow
 def test_weights_in_balance_at_every_height_are_printed_as_one_indifferent_equilibrium(tmp_path, capsys):
     """Two weights of 1.5 kg hang on one rope over a pulley."""
     path = str(tmp_path / "weights.toml")
