@@ -19,11 +19,12 @@ from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.processes.child import ChildFailed
 from crosscheck.processes.pool import ask, end_idle
 from crosscheck.refusals import shortened
+from crosscheck.study import store
 from crosscheck.study.provenance import made_by
-from crosscheck.study.record_shape import Record, checked
+from crosscheck.study.record_shape import Record
 from crosscheck.study.store import in_digits
 from mbref.motions.trajectory import Outcome
-from mbref.records import looked_at, rewrite
+from mbref.records import rewrite
 from mbref.scene import Scene
 
 FILE = Path(__file__).parent / "records.jsonl.xz"
@@ -82,7 +83,7 @@ class Shape(BaseModel):
 
 def read(path: Path = FILE) -> list[Record]:
     """Return the stored records. Raises RecordsError."""
-    return list(checked(path, list(looked_at(path).values()), Shape))
+    return list(store.read(path, Shape).values())
 
 
 def mechanism(number: int) -> Scene:

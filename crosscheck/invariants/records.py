@@ -13,12 +13,13 @@ from pydantic import BaseModel, ConfigDict, model_validator
 from crosscheck.engine import Cannot, Engine, Owner, Setting, engine
 from crosscheck.invariants.experiments import EXPERIMENTS, Experiment, times_of
 from crosscheck.processes.pool import end_idle, run_isolated
+from crosscheck.study import store
 from crosscheck.study.grades import DEFAULTS
 from crosscheck.study.provenance import made_by
-from crosscheck.study.record_shape import Record, checked
+from crosscheck.study.record_shape import Record
 from crosscheck.study.store import REFUSED, in_digits
 from mbref.motions.trajectory import Outcome, Trajectory
-from mbref.records import looked_at, rewrite
+from mbref.records import rewrite
 
 FILE = Path(__file__).parent / "records.jsonl.xz"
 TIME_LIMIT = 10.0  # s of CPU time of a run, so that all runs of an engine take some minutes
@@ -79,7 +80,7 @@ class Shape(BaseModel):
 
 def read(path: Path = FILE) -> list[Record]:
     """Return the stored records. Raises RecordsError."""
-    return list(checked(path, list(looked_at(path).values()), Shape))
+    return list(store.read(path, Shape).values())
 
 
 def rows_of(name: str) -> list[Row]:

@@ -33,9 +33,7 @@ from mbref.scenes import find_scene
 from mbref.simulation.simulate import simulate
 
 FIND_EQUILIBRIUM = "mbref.equilibria(scene)[0].scene is"
-AT_BALANCE = (
-    1e-7  # displacement (lengths of the mechanism or rad) from the pose to the equilibrium that is rounding
-)
+AT_BALANCE = 1e-7  # displacement (lengths of the mechanism, or rad) to the equilibrium that is rounding
 NEUTRAL = 1e-10  # stiffness / largest stiffness below which an equilibrium does not determine its pose
 
 
