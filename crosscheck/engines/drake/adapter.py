@@ -1,8 +1,8 @@
 """Drake: joint coordinates, with loops closed by constraints of the discrete plant, which Drake's SAP solver
 satisfies.
 
-Drake's step is of first order. The solver of the discrete plant ends the process if a ball constraint
-connects a body to the world (1.51.1, 1.58.0), so loops are cut between moving links. A continuous plant has
+Drake's step is of first order. The solver of the discrete plant (1.51.1) can end the process on ball
+constraints, which it does not on loops that are cut between moving links. A continuous plant has
 no constraints. crosscheck integrates the equations of the continuous plant.
 """
 

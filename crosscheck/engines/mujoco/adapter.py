@@ -37,7 +37,7 @@ from crosscheck.judge.pieces import at_start
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene, intermittent
 
-# parts of a new model that have defaults; reading a name of a default class ends the process
+# parts of a new model that have defaults
 DEFAULTS = (
     *("option", "compiler", "default.equality.solref", "default.equality.solimp"),
     *(f"default.joint.{name}" for name in ("armature", "damping", "stiffness", "frictionloss")),

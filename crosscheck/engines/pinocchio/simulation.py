@@ -269,7 +269,7 @@ class Simulation:
 
 
 def ground_second(pin: Any, model: Any, closure: Any) -> Any:
-    """Return a closure whose first joint is not the ground, on which lcaba writes outside its memory."""
+    """Return a closure as lcaba of Pinocchio 4.1.0 takes it: its first joint is not the ground."""
     if closure.joint1_id:
         return closure
     ends = (closure.joint2_id, closure.joint2_placement, closure.joint1_id, closure.joint1_placement)
