@@ -17,7 +17,7 @@ from tests.helpers.fake_engines import DAMAGES, FAKE, FAKES, MALFORMED, SCALARS
 TIMES = np.array([0.0, 0.1, 0.3])
 BLOCK = Body(name="block", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(1.0, 2.0, 3.0))
 SCENE = Scene(name="still", body=(BLOCK,))
-SAYS = {  # what each function of DAMAGES changes in a good answer: the words of its error
+SAYS = {  # function of DAMAGES, named by what it changes in a good answer: the words of the error
     "nothing": "returned NoneType, not a Trajectory",
     "a table": "returned dict, not a Trajectory",
     "an engine": "not a Trajectory",
@@ -42,12 +42,12 @@ SAYS = {  # what each function of DAMAGES changes in a good answer: the words of
 }
 
 
-@pytest.mark.parametrize("damage", DAMAGES)
-def test_error_of_a_malformed_answer_names_its_defect(damage: str):
-    """The engine MALFORMED changes one thing in a good answer; SAYS has the words of the error."""
+@pytest.mark.parametrize(("damage", "words"), [(damage, SAYS[damage]) for damage in DAMAGES])
+def test_error_of_a_malformed_answer_names_its_defect(damage: str, words: str):
+    """The engine MALFORMED gives a good answer with the one change that ``damage`` names."""
     with pytest.raises(MalformedAnswer) as caught:
         well_formed(MALFORMED.run(SCENE, TIMES, Setting("a", {"damage": damage})), SCENE, TIMES)
-    assert SAYS[damage] in str(caught.value)
+    assert words in str(caught.value)
 
 
 def test_only_a_failed_run_may_answer_with_the_first_samples_alone():

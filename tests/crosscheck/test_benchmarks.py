@@ -10,7 +10,7 @@ from mbref.scenes import SCENES
 from tests.crosscheck.measured import relative_error
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
-ERROR = 1e-8  # m or rad at the tolerance 1e-11; fast scenes magnify local errors by their sensitivity
+ERROR = 1e-8  # of the length, or rad, at the tolerance 1e-11; fast scenes magnify local errors
 # scenes in closed form, and one whose equation is integrated; others take seconds to compile
 QUICK = ("four_bar", "spatial_slider_crank_driven", "planar_slider_crank_gravity")
 PLANAR = [f"planar_slider_crank{variant}" for variant in ("", "_equal", "_heavy", "_gravity")]
@@ -33,8 +33,8 @@ def error_of(simulator, name: str, setting: Setting) -> float:
     "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in BY_HAND]
 )
 def test_equation_derived_by_hand_gives_the_true_motion(name: str):
-    """The engine LIMIT of benchmarks/limit.py integrates it at its finest setting. The judge has the truth:
-    a closed form, or a solution of its own equation."""
+    """The engine LIMIT of benchmarks/limit.py integrates it at its finest setting. The error from the judge's
+    truth, a closed form or a solution of its own equation, is below 1e-8 of the length or rad."""
     from limit import LIMIT
 
     scene = SCENES[name]()
@@ -46,7 +46,8 @@ def test_equation_derived_by_hand_gives_the_true_motion(name: str):
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ["DOP853", "Radau"])
 def test_scipys_integrators_reach_the_true_motion_at_a_fine_tolerance(family: str):
-    """Errors (m or rad) fall with the tolerance: above 1e-7 at a tolerance of 1e-5, and below it at 1e-9."""
+    """The error from the closed form, of the length or rad, is above 1e-7 at a tolerance of 1e-5, and below
+    it at 1e-9."""
     from general_integrators import SCIPY
 
     coarse, fine = (

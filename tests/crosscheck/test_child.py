@@ -38,6 +38,7 @@ def test_calls_share_a_process_but_no_folder_and_no_printed_text(child: Child):
 
 
 def test_a_silent_call_after_a_long_output_has_no_output(child: Child):
+    """``converse`` prints 200 characters; the sum of the next call comes without printed text and files."""
     child.call(converse, ("word " * 40,), 60.0)
     assert child.call(operator.add, (2, 3), 60.0) == (5, "", ())
 
@@ -50,10 +51,11 @@ def test_a_child_has_the_environment_variables_of_its_parent_when_it_starts(monk
 
 
 def test_a_call_that_raises_ends_its_child_as_crashed(child: Child):
+    """1 / 0 raises; a next call in this process would find remains of the failed one."""
     with pytest.raises(ChildFailed, match="ZeroDivisionError: division by zero") as raised:
         child.call(operator.truediv, (1, 0), 60.0)
     assert raised.value.outcome is Outcome.CRASHED
-    assert not child.is_alive, "the next call would find remains of the failed one"
+    assert not child.is_alive
 
 
 @pytest.mark.parametrize("in_copy", [False, True], ids=["in the child", "in a forked copy"])
@@ -71,18 +73,20 @@ def test_a_call_past_its_limit_times_out_and_its_processes_end(child: Child, tmp
 
 
 def test_large_answers_arrive_whole(child: Child):
+    """A million numbers are more than a pipe of the operating system holds."""
     many = list(range(1_000_000))
     assert child.call(sorted, (many,), 60.0).value == many
 
 
 def test_value_that_cannot_be_sent_is_a_failed_call(child: Child):
+    """The call returns a lock, which Python cannot send between processes."""
     with pytest.raises(ChildFailed, match="cannot pickle"):
         child.call(threading.Lock, (), 60.0)
 
 
 def test_the_command_line_computes_with_one_thread_unless_the_user_sets_a_number():
-    """The user sets the variable of one library to 3. Variables are set before numpy is imported, which reads
-    them once."""
+    """The user sets OpenMP's number to 3, and OpenBLAS' becomes 1. Variables are set before numpy is
+    imported, which reads them once."""
     known = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
     code = "import os, sys, crosscheck; assert 'numpy' not in sys.modules; import crosscheck.cli\n"
     code += "print(os.environ['OMP_NUM_THREADS'], os.environ['OPENBLAS_NUM_THREADS'])"

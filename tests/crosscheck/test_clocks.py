@@ -26,8 +26,9 @@ OTHER_TICKS = {  # building and stepping (s) of families that read the clock at 
 
 @pytest.mark.parametrize(("name", "part"), ENGINES)
 def test_cost_of_a_run_is_cpu_time_of_building_and_of_stepping(name, part, monkeypatch):
-    """By the clock of `ticks`, with the seconds of the module's docstring. A wall clock would give fractions
-    of a second, and an interval that counts twice would give more."""
+    """The CPU clock of `ticks` advances 1 s at each reading. It is read at the start and end of building, and
+    of each of three intervals of stepping, or of one call for all; OTHER_TICKS has families that read it more
+    often. A wall clock would give fractions of a second."""
     scene = able(name, driven_arm(), SCENES["planar_slider_crank_gravity"]().with_(duration=0.01))
     for setting in coarsest(name, scene, part):
         own = OTHER_TICKS.get((name, setting.family))

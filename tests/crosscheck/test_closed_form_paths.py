@@ -84,7 +84,8 @@ FALLING = scene(
 
 
 def test_a_free_body_falls_and_spins_uniformly_about_a_principal_axis():
-    """At t = 0.5 s it has fallen by g t² / 2 = 1.25 m, and has turned about z by 2 rad/s · t = 1 rad."""
+    """From (1, 0, 0) m with 1 m/s along x, 2 rad/s about z and g = 10 m/s² along -y: at 0.5 s it is 0.5 m
+    further, g t² / 2 = 1.25 m lower, and has turned by 1 rad."""
     found = free_body(FALLING).poses(np.array([0.0, 0.5]))
     assert found.position[1, 0] == pytest.approx([1.5, -1.25, 0.0])
     assert found.velocity[1, 0] == pytest.approx([1.0, -5.0, 0.0])
@@ -102,8 +103,8 @@ def test_a_moment_about_a_principal_axis_accelerates_the_spin_of_a_free_body():
 
 
 def test_a_body_on_one_hinge_or_on_two_coaxial_hinges_is_not_locked():
-    """Two hinges have ten constraint rows, of which five are redundant: one freedom is left. Hinges about z
-    and x leave none."""
+    """`locked` is the closed form of a body that cannot move, or None. Coaxial hinges have five redundant
+    rows of ten, which leave one freedom; hinges about z and x leave none."""
     crossed = pin("B", "ground", "bar", 0.0, 0.0, 0.0, axis=X)
     assert locked(PENDULUM.with_(joint=(*PENDULUM.joint, crossed))).name == "locked"
     assert locked(PENDULUM) is None
@@ -133,7 +134,7 @@ def spatial(line: tuple[float, ...], order: str = "crs", reverse: bool = False, 
 
 
 CRANK_ANGLES = np.array([-0.7, 0.0, 0.4])  # rad
-CLOSED = 1e-13  # m or rad; 1e-15 is measured
+CLOSED = 1e-13  # m or rad; hundred times the measured rounding
 of_cranks = pytest.mark.parametrize(
     ("line", "order", "reverse", "way"),
     [
@@ -147,7 +148,8 @@ of_cranks = pytest.mark.parametrize(
 
 @of_cranks
 def test_path_of_a_spatial_slider_crank_closes_its_joints(line, order, reverse, way):
-    """Residuals of the judge's joint equations."""
+    """At three angles of the crank the residuals of the judge's joint equations are below 1e-13 m or rad,
+    hundred times the measured rounding."""
     given = spatial(line, order, reverse, way)
     pose = spatial_slider_crank(given).poses(CRANK_ANGLES.astype(np.longdouble))
     turns = rotations.from_matrix(pose.rotation.astype(float))
@@ -157,8 +159,8 @@ def test_path_of_a_spatial_slider_crank_closes_its_joints(line, order, reverse, 
 
 @of_cranks
 def test_path_of_a_spatial_slider_crank_begins_at_the_pose_of_the_scene(line, order, reverse, way):
-    """Before the crank turns, positions (m) and rotation matrices are those that the scene states, to
-    CLOSED."""
+    """At the crank's angle 0, positions (m) and rotation matrices are those that the scene states, to 1e-13:
+    hundred times the measured rounding."""
     given = spatial(line, order, reverse, way)
     pose = spatial_slider_crank(given).poses(np.zeros(1, np.longdouble))
     assert np.abs(pose.position[0] - [b.position for b in given.body]).max() < CLOSED
@@ -168,7 +170,8 @@ def test_path_of_a_spatial_slider_crank_begins_at_the_pose_of_the_scene(line, or
 
 @of_cranks
 def test_only_a_driver_of_the_crank_prescribes_the_path_of_a_spatial_slider_crank(line, order, reverse, way):
-    """A driver of the crank's hinge A has the path's sign 1; one of the slide D has none."""
+    """`driven_sign` is the sense in which a driver moves the path's angle. A driver of the crank's hinge A
+    has sign 1; one of the slide D prescribes no angle: None."""
     path = spatial_slider_crank(spatial(line, order, reverse, way))
     signs = [path.driven_sign(Driver(joint=name, polynomial=(0.0, 1.0))) for name in "AD"]
     assert signs == [1.0, None]

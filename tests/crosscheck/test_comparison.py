@@ -45,6 +45,7 @@ def test_a_comparison_in_python_equals_the_json_of_the_command(compared, tmp_pat
 
 
 def test_text_of_a_comparison_has_its_headline_in_eighty_columns(compared):
+    """Commands, which are copied into a shell, are not wrapped."""
     assert str(compared).startswith("\nblock, 0.5 s: bodies: 1")
     assert compared.verdict.headline in " ".join(str(compared).split())
     assert all(len(line) <= 80 for line in str(compared).splitlines() if "crosscheck run" not in line)
@@ -98,6 +99,8 @@ def test_runs_of_one_engine_follow_each_other_and_do_not_wait_for_their_measurem
 
 
 def test_an_exception_in_a_run_is_raised_by_the_study():
+    """The executor of comparisons runs the only case, whose function raises OSError."""
+
     def run(asked):
         raise OSError("no disk")
 

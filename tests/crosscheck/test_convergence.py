@@ -25,7 +25,8 @@ def runs(power: float, floor: float, count: int = 12) -> list[dict]:
 
 @pytest.mark.parametrize("power", [1.0, 2.0, 4.0])
 def test_order_is_the_power_of_the_step_in_errors_above_their_floor(power: float) -> None:
-    """Errors are step**power + 1e-9; the floor of 1e-9 bends the line by less than 0.05."""
+    """``order`` is the slope of log error over log step. Errors are step**power + 1e-9; the floor of 1e-9
+    changes it by less than 0.05."""
     assert order(runs(power, 1e-9)) == pytest.approx(power, abs=0.05)
 
 
@@ -67,7 +68,8 @@ def test_last_runs_that_lower_the_least_error_by_less_than_30_percent_are_counte
 
 
 def test_steps_of_a_ladder_are_halved_and_divide_the_interval_of_samples() -> None:
-    """Samples are a tenth of the motion apart."""
+    """Bennett's linkage in MuJoCo's family "tuned": more than ten steps. Samples are a tenth of the motion
+    apart, a multiple of the first step."""
     cases = ladder(TUNED_MUJOCO, BENNETT)
     steps = [case.setting.options["step"] for case in cases]
     assert all(a == 2 * b for a, b in pairwise(steps)) and len(steps) > 10

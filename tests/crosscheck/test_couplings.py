@@ -23,7 +23,6 @@ FINE = {
 FAMILIES = {"mujoco": "projected", "exudyn": "tuned"}  # whose finest settings are used
 MODULES = {"drake": "pydrake", "dart": "dartpy", "pinocchio": "pinocchio", "simbody": "opensim"}
 LACKS = {"pinocchio": "coupling", "simbody": "armature", "bullet": "armature"}  # missing in the engines
-APART = 1e-13  # m or m/s; differences of two computations of one quantity by rounding
 
 
 def test_run_with_another_gear_ratio_violates_the_coupling_by_its_slip():
@@ -38,21 +37,22 @@ def test_run_with_another_gear_ratio_violates_the_coupling_by_its_slip():
 
 @pytest.mark.parametrize("name", ["sundials", "ondsel", "casadi", "heyoka"])
 def test_adapters_without_couplings_and_armatures_refuse_them_by_name(name):
+    """The refusals name coupling 'teeth' of two gears, and joint 'A' of a pendulum with a rotor."""
     for scene, part in ((gear_pair(), "coupling 'teeth'"), (pendulum(), "joint 'A' has an armature")):
         refusal = engine(name).cannot(scene)
         assert refusal is not None and refusal.owner is Owner.ADAPTER and part in refusal.reason, refusal
 
 
 def test_armatures_count_in_the_start_velocities_of_least_kinetic_energy():
-    """Velocities that the scene leaves open minimise the kinetic energy of bodies and rotors, by mbref as by
-    the judge's reference in long doubles. Without rotors some are over 1 cm/s different."""
+    """Velocities that the scene leaves open minimise the kinetic energy of bodies and rotors: mbref's are the
+    judge's, in long doubles, to 1e-13 m/s of rounding. Without rotors some are over 1 cm/s different."""
     scene = spatial_chain()
     joints = [joint.model_copy(update={"armature": 0.0}) for joint in scene.joint]
     exact, bare = (
         doubles(natural_motion(each, np.zeros(1), EXTENDED, seconds=60.0).velocity[0])
         for each in (scene, scene.with_(joint=joints))
     )
-    assert np.abs(mbref.simulate(scene, times=[0.0]).velocity[0] - exact).max() < APART
+    assert np.abs(mbref.simulate(scene, times=[0.0]).velocity[0] - exact).max() < 1e-13
     assert np.abs(bare - exact).max() > 0.01
 
 
@@ -79,8 +79,8 @@ def test_refusal_of_an_engine_names_the_coupling_or_armature_that_it_lacks(name,
 
 @pytest.mark.parametrize(("name", "make"), [p for p in PAIRS if not needs_what_is_missing(*p.values)])
 def test_engines_move_coupled_joints_as_the_reference(name, make):
-    """Errors of the states against the judge's truth stay below ENGINES. Reactions differ from the truth by
-    less than 1e-6 of the largest reaction."""
+    """Errors from the judge's truth and violations are below 1e-8 of the length or rad. Reactions differ from
+    the truth's by less than 1e-6 of the largest reaction. Settings are fine: FINE, or a sweep's finest."""
     pytest.importorskip(MODULES.get(name, name))
     scene, simulator = make().with_(duration=0.4), engine(name)
     fine = FINE[name] if name in FINE else simulator.settings_of(scene, FAMILIES[name])[-1]
@@ -102,7 +102,8 @@ def test_drakes_own_stepping_keeps_couplings_and_armatures():
 
 @pytest.mark.parametrize("make", [make for make in EVERY if not needs_what_is_missing("bullet", make)])
 def test_bullet_moves_coupled_joints_to_first_order(make):
-    """Half the step gives half the error against the judge's truth, within 5 %, and joints stay closed."""
+    """Half the step gives half the error against the judge's truth, within 5 %. Joints stay closed to 1e-7 of
+    the length by 1000 iterations of Bullet's solver a step."""
     pytest.importorskip("pybullet")
     scene, bullet = make().with_(duration=0.2), engine("bullet")
     errors = []

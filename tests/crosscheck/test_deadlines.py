@@ -49,7 +49,8 @@ def cpu_seconds(work: Callable[[], object]) -> float:
 
 @pytest.mark.parametrize("name", HARD)
 def test_search_for_a_reference_ends_at_its_limit_of_cpu_time(name):
-    """A search that needs more than 1 s ends with that reason, within twice the limit and 2 s of set-up."""
+    """HARD has scenes that need more than the limit of 1 s. The search ends with that reason (OVER), within
+    twice the limit and 2 s of set-up, which has no limit."""
     make, end = HARD[name]
     scene, times = make(), np.linspace(0.0, end, 101)
     motions = []
@@ -59,9 +60,9 @@ def test_search_for_a_reference_ends_at_its_limit_of_cpu_time(name):
 
 
 def test_reference_passes_the_singular_position_of_an_uneven_five_bar():
-    """The driven five-bar is singular near 0.0126 s. There its coordinates depend on lengths by square
-    roots: errors of 1e-8 m move bodies by up to √1e-8 m from the closed form of the exact five-bar. Before,
-    the run ended at 0.01259 s."""
+    """The driven five-bar is singular near 0.0126 s. There its coordinates depend on lengths by square roots:
+    errors of 1e-8 m move bodies by up to √1e-8 m from the closed form of the exact five-bar. Before, the run
+    ended at 0.01259 s."""
     times = np.array([0.0125, 0.0126, 0.0127])
     motion = natural_motion(uneven_five_bar(), times, EXTENDED, seconds=20.0)
     assert not motion.reason and list(motion.times) == list(times), f"{motion.reason} at {motion.reached} s"

@@ -61,6 +61,8 @@ UNKNOWN = {  # a scene with an undeclared part, and words of its refusal
 @pytest.mark.parametrize("part", UNKNOWN)
 @pytest.mark.parametrize("name", EVERY_ENGINE)
 def test_an_undeclared_joint_driven_coordinate_or_load_is_refused_by_name(name: str, part: str) -> None:
+    """UNKNOWN has scenes with a screw, a hinge driven by its length and a magnet, and words of the
+    refusals."""
     scene, words = UNKNOWN[part]
     refusal = engine(name).cannot(scene)
     assert refusal is not None and refusal.owner is Owner.ADAPTER, f"{name}: {refusal}"
@@ -83,11 +85,13 @@ class Bare(Engine):
 
 
 def test_an_engine_without_declarations_accepts_a_free_body_and_refuses_a_joint() -> None:
+    """Bare is such an engine; the joint is a hinge."""
     assert Bare().cannot(with_unknown(joint=())) is None
     assert isinstance(Bare().cannot(with_unknown()), Cannot)
 
 
 def test_reason_names_an_undeclared_driver_of_a_declared_joint() -> None:
+    """Hinges are declared and their drivers are not: the refusal names hinge 'J' and its driven angle."""
     supports = Supports(joints=("revolute",), loads=("moment",))
     assert supports.missing(with_unknown()) is None
     driven = supports.missing(with_unknown(driver=(Driver(joint="J"),)))

@@ -79,13 +79,15 @@ def test_interleaved_times_of_a_folder_replace_those_of_its_records(tmp_path):
 
 
 def test_records_are_loaded_by_scene_engine_family_options_and_samples(tmp_path):
+    """Two records of families f and g; their file is given by its path or by its folder's."""
     place = stored(tmp_path, {"key": "k1"}, {"key": "k2", "family": "g"})
-    assert load(place / "records.jsonl") == load(place), "the path of the file, or of its folder"
+    assert load(place / "records.jsonl") == load(place)
     [first, second] = load(place)
     assert first == ("s", "a", "f", '{"step": 0.1}', '{"samples": 3, "end": 1.0}') and second[2] == "g"
 
 
 def test_a_missing_file_or_field_of_records_is_refused(tmp_path):
+    """The folder "none" does not exist; a record without ``asked`` does not say which run it is."""
     with pytest.raises(ValueError, match=r"none\S*: no such file"):
         load(tmp_path / "none")
     (tmp_path / "records.jsonl").write_text('{"key": "k", "scene": "s", "cost": {"seconds": 1.0}}\n')
@@ -107,6 +109,7 @@ def test_records_of_another_version_of_a_scene_are_left_out(tmp_path):
 
 
 def test_a_faulty_scene_of_a_folder_of_records_is_refused(tmp_path):
+    """Its gravity is one number; the error names the scene's file in the folder."""
     place = stored(tmp_path, {"key": "k1"})
     (place / "scenes").mkdir()
     (place / "scenes" / "s.toml").write_text("gravity = 3\n")
@@ -148,7 +151,8 @@ def circumstance(engine: str, version: str, cpu: str, **more: Any) -> dict[str, 
 
 
 def test_comparison_of_records_names_changed_versions_machines_and_mechanisms():
-    """``circumstance`` has engine, version and machine of a run by its key."""
+    """``circumstance`` is a record of scene s by an engine, its version and a processor. The first engine has
+    two versions before and one after; run 1 moves to another processor and run 2 to another mechanism."""
     old = {
         "1": circumstance("a", "1.0", "x", commit="c1"),
         "2": circumstance("a", "1.1", "x", mechanism="m1"),

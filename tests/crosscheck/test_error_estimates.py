@@ -45,6 +45,7 @@ def test_a_run_outside_a_study_has_no_estimate():
 
 
 def test_an_engine_without_estimates_has_none_in_its_record():
+    """The engine FAKE has no estimate of its own: its run stays as it is."""
     record = run_case(Case(SCENE, TIMES, f"{FAKES}:FAKE", Setting("a", {"seconds": 0.5})))
     assert "error_estimate" not in record
     run = Fake().run(SCENE, TIMES, Setting("a", {"seconds": 0.5}))

@@ -36,6 +36,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_list_names_an_installed_plug_in_with_its_version(installed, capsys):
+    """The table of ``crosscheck list engines`` has engine, package and version of the example's project."""
     assert "tiny" in engine_names(), engine_names()
     assert main(["list", "engines"]) == 0
     out = capsys.readouterr().out

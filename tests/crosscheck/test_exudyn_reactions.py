@@ -42,7 +42,8 @@ def needed_wrench(scene: Scene, trajectory: Trajectory) -> np.ndarray:
 @pytest.mark.parametrize("bodies", [("ground", "b"), ("b", "ground")])
 @pytest.mark.parametrize(("kind", "driven"), [*UNDRIVEN, *DRIVEN])
 def test_exudyns_reaction_causes_the_acceleration_of_the_body(kind, driven, bodies):
-    """F = m (a - g), and M = J α + ω × J ω less the applied moment, about the joint's anchor."""
+    """F = m (a - g), and M = J α + ω × J ω less the applied moment, about the joint's anchor. The difference
+    is at most ten times the measured 1.6e-10 of the largest force or moment."""
     scene = Scene(
         name="held",
         body=(BODY,),
@@ -61,7 +62,8 @@ def test_exudyns_reaction_causes_the_acceleration_of_the_body(kind, driven, bodi
 
 
 def test_exudyn_gives_no_accelerations_and_reactions_with_an_accelerating_driver():
-    """Exudyn's initial multipliers leave it out. With a driver of constant rate both are given."""
+    """Exudyn's initial multipliers lack the driver's acceleration, here of a sine. With a driver of constant
+    rate both are given."""
     joint = Revolute.at("J", ("ground", "b"), **PLACES)
     shaken, turned = (
         ENGINE.run(

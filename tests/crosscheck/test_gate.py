@@ -26,7 +26,7 @@ def short_run(scene, times=None):
 
 @pytest.mark.parametrize("name", CLOSED)
 def test_exact_motions_of_a_scene_pass_the_comparison_with_and_without_accelerations(name):
-    """``gate`` returns the first difference of short runs, or None."""
+    """``gate`` returns the first difference of short runs, or None. The runs are closed forms."""
     run = short_run(SCENES[name]())
     found = gate(SCENES[name](), [run, replace(run, acceleration=None, angular_acceleration=None), run])
     assert found is None, f"{name}: {found}"
@@ -73,8 +73,9 @@ BALANCED = {
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio"])
 @pytest.mark.parametrize("balanced", BALANCED)
 def test_engines_pass_the_comparison_where_forces_balance_to_rounding(balanced, name):
-    """Changes of velocity of Gauss's principle and of the engine are rounding; their difference is relative
-    to free fall, and not to the largest of them."""
+    """``gate`` compares an engine's short run with Gauss's principle and returns None for no difference.
+    Changes of velocity are rounding here; they are measured relative to free fall, not to the largest of
+    them."""
     scene = BALANCED[balanced]
     setting = engine(name).best_settings(scene)[-1]
     run = run_once(name, scene, gate_times(scene), setting)
@@ -84,7 +85,8 @@ def test_engines_pass_the_comparison_where_forces_balance_to_rounding(balanced, 
 
 @pytest.mark.parametrize(("part", "passes"), [(0.9, True), (1.1, False)])
 def test_differences_of_a_body_in_balance_are_relative_to_free_fall(part, passes):
-    """Velocities may be off by the part SAME_CHANGE · LEAST_CHANGE of g t: 0.9 of it pass, 1.1 do not."""
+    """Velocities may be off by the tolerances SAME_CHANGE · LEAST_CHANGE times g t: 0.9 of this passes, 1.1
+    of it does not."""
     scene = BALANCED["a boom held by a spring"]
     exact = gauss_motion(scene, tuple(gate_times(scene)))
     shift = np.zeros_like(exact.velocity)
@@ -111,7 +113,7 @@ def test_a_missing_spring_that_is_slack_at_the_start_is_found_along_the_run():
 
 @pytest.mark.parametrize(("part", "passes"), [(0.009, True), (0.011, False)])
 def test_accelerations_along_a_run_may_be_off_by_one_percent(part, passes):
-    """Accelerations of a run by Gauss's principle, 0.9 or 1.1 % too large; one without them passes."""
+    """Accelerations of a pendulum by Gauss's principle, 0.9 or 1.1 % too large; a run without them passes."""
     scene = arm()
     run = gauss_motion(scene, (0.0, 0.1))
     names = ("acceleration", "angular_acceleration")
@@ -152,7 +154,8 @@ def test_states_in_single_precision_pass_only_if_the_engine_declares_its_roundin
 
 @pytest.mark.parametrize(("share", "field"), [(0.9, ""), (1.1, "change of velocity")])
 def test_changes_of_velocity_in_single_precision_may_be_off_by_a_share_of_the_largest(share, field):
-    """The share is SINGLE_CHANGE: 0.9 of it pass, and 1.1 do not."""
+    """A velocity is off by 0.9 or 1.1 times SINGLE_CHANGE, the tolerance, of the largest change of a velocity
+    or of an angular velocity times the length. "" stands for no difference."""
     scene = FOUR_BAR
     exact = short_run(scene)
     changes = np.diff(exact.velocity, axis=0), scene_length(scene) * np.diff(exact.angular_velocity, axis=0)

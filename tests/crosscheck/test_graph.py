@@ -101,6 +101,7 @@ def spatial_inertia(mass: float, centre: np.ndarray, inertia: np.ndarray) -> np.
 
 @given(graphs())
 def test_every_link_has_a_positive_mass_and_inertia(scene: Scene) -> None:
+    """Engines refuse others. The least principal moment of inertia is positive."""
     for link in spanning_tree(scene).links:
         least = np.linalg.eigvalsh(link.inertia)[0]
         assert link.mass > 0 and least > 0, (
@@ -110,6 +111,8 @@ def test_every_link_has_a_positive_mass_and_inertia(scene: Scene) -> None:
 
 @given(graphs(), st.data())
 def test_a_driven_joint_is_never_cut_and_has_one_coordinate(scene: Scene, data: st.DataObject) -> None:
+    """The driver is of any joint of the random scene that may have one; ``nv`` is the number of
+    coordinates."""
     names = [joint.name for joint in scene.joint if joint.facts.driven]
     assume(names)
     name = data.draw(st.sampled_from(names))
@@ -134,7 +137,7 @@ def test_a_loop_is_cut_at_its_joint_with_most_freedoms(kind: str) -> None:
 
 @pytest.mark.parametrize(("kind", "axis"), [("fixed", {}), ("translational", {"axis": X})])
 def test_a_body_is_split_in_halves_to_cut_a_loop_of_equal_joints(kind: str, axis: dict) -> None:
-    """Two bodies of 2 kg and three joints in a loop."""
+    """Two bodies of 2 kg and three joints in a loop: body b becomes two links of 1 kg."""
     pairs = (("ground", "a"), ("a", "b"), ("b", "ground"))
     bodies = [block(name, (0.0, 0.0, 0.0), 2.0) for name in "ab"]
     joints = [joint(f"j{i}", kind, *pair, **axis) for i, pair in enumerate(pairs)]
@@ -152,9 +155,6 @@ def test_a_rod_takes_less_than_half_of_the_effective_mass_at_its_ends() -> None:
     whole = spanning_tree(scene.with_(joint=tuple(j for j in scene.joint if not isinstance(j, Distance))))
     spare = min(effective_mass(whole.links[whole.own[b]], point) for b, point in rod.ends)
     assert 0 < rod.mass / 2 < 0.5 * spare, (rod.mass, spare)
-
-
-SOLVED = 1e-11  # of the largest velocity, and at least 1e-11 m/s: rounding of a linear system of 100 rows
 
 
 @given(graphs(), st.sampled_from([(), ("spherical", "revolute")]))
@@ -177,6 +177,7 @@ def hinged(*pairs: tuple[str, str]) -> Scene:
 
 
 def test_a_four_bar_is_cut_at_its_last_joint_or_at_its_last_joint_between_links():
+    """Joints 0 to 3 lead from the ground over links a, b and c to the ground; 2 is between b and c."""
     four_bar = hinged(("ground", "a"), ("a", "b"), ("b", "c"), ("c", "ground"))
     [at_ground] = spanning_tree(four_bar, ("revolute",)).closures
     assert at_ground.joint == 3 and GROUND_LINK in at_ground.links

@@ -86,7 +86,8 @@ def runner_with(defect, monkeypatch):
     ],
 )
 def test_hint_names_the_term_of_the_equations_that_is_wrong(defect, names, says, monkeypatch):
-    """The engine solves the equations of `Defective` with one defect; it fails `truth` of ``names``."""
+    """`Defective` has the example engine's equations with one defect, such as gravity of 102 %. The engine
+    fails the check `truth` on the scenes ``names``, and the hint has the words ``says``."""
     runner = runner_with(defect, monkeypatch)
     found = hint(runner, [Failure(KNOWN[name], "truth") for name in names])
     assert says in found, found
@@ -100,11 +101,13 @@ def test_hint_for_an_engine_with_right_accelerations_points_at_its_integration(m
 
 
 def test_a_conforming_engine_has_no_hint(monkeypatch):
+    """The example engine without a defect ("") passes all checks on a free fall."""
     conforming = held_against(runner_with("", monkeypatch), [KNOWN["free_fall"]])
     assert conforming.conforms and conforming.hint == ""
 
 
 def test_result_of_verify_on_a_failing_engine_has_the_hint(monkeypatch):
+    """The engine without gravity fails on a free fall; the hint is in the result and in its record."""
     failing = held_against(runner_with("gravity", monkeypatch), [KNOWN["free_fall"]])
     assert "gravity left out explains 1 of 1 scenes" in failing.hint and not failing.conforms
     assert failing.to_record()["hint"] == failing.hint

@@ -14,7 +14,7 @@ from mbref import rotations
 from mbref.formats import ImportOptions
 from mbref.scene import SceneError
 
-SAME = 1e-8  # allowed difference as a fraction of the largest acceleration; 2e-10 is the largest seen
+SAME = 1e-8  # allowed difference of accelerations, of the largest; 2e-10 is the largest measured
 
 
 def accelerations(found: Source, loops=()) -> np.ndarray:
@@ -101,7 +101,8 @@ def test_an_open_connect_of_sites_is_closed_with_the_lengths_of_the_file(tmp_pat
 
 
 def test_loop_closes_at_the_given_pose_of_a_joint(tmp_path):
-    """Joint A stays at 0.4 rad; the others move."""
+    """The option gives joint A 0.4 rad, and the loop is closed by the others: the scene accelerates as
+    MuJoCo's matrices of the closed file say."""
     found = read(tmp_path, OPEN_LOOP.replace("EQUALITY", CONNECT), pose={"A": 0.4})
     assert found.qpos[0] == 0.4
     assert difference(found) < SAME
@@ -120,6 +121,7 @@ def test_loop_that_a_keyframe_almost_closes_is_closed_near_it(tmp_path):
 
 
 def test_unknown_keyframe_or_joint_of_a_pose_is_refused_with_the_known_names(tmp_path):
+    """The file has the keyframe "low" and joints A, B and D."""
     text = OPEN_LOOP.replace("EQUALITY", CONNECT)
     with pytest.raises(SceneError, match="no keyframe 'lo'; known: low; did you mean 'low'"):
         read(tmp_path, text, keyframe="lo")
@@ -138,7 +140,8 @@ def test_refusal_of_a_loop_that_is_too_short_states_the_least_gap(span, tmp_path
 
 
 def test_a_weld_without_torque_is_a_spherical_joint(tmp_path):
-    """By MuJoCo, torquescale="0" leaves a weld its forces alone."""
+    """In MuJoCo, torquescale="0" leaves a weld its forces alone. The scene accelerates as MuJoCo's
+    matrices."""
     weld = '<weld name="C" site1="tip" site2="toe" torquescale="0"/>'
     found = read(tmp_path, OPEN_LOOP.replace("EQUALITY", weld))
     assert found.imported.scene.joint_named("C").type == "spherical"
@@ -185,7 +188,8 @@ def middle(first: str, second: str, apart: str = "0 0 0", more: str = "") -> str
     ],
 )
 def test_two_hinges_of_a_massless_link_leave_two_freedoms(second, apart, joints, masses, tmp_path):
-    """The link is left out where a scene has joints that replace both hinges."""
+    """The link is left out where a scene has joints that replace both hinges. Freedoms are six a body less
+    the judge's rank; the scene accelerates as MuJoCo's matrices say."""
     found = read(tmp_path, middle("0 1 0", second, apart), "hinges.urdf")
     scene = found.imported.scene
     assert [joint.type for joint in scene.joint] == joints and [body.mass for body in scene.body] == masses
@@ -194,6 +198,7 @@ def test_two_hinges_of_a_massless_link_leave_two_freedoms(second, apart, joints,
 
 
 def test_a_massless_link_that_carries_two_bodies_remains_a_body(tmp_path):
+    """No joint could replace its three hinges. The scene accelerates as MuJoCo's matrices say."""
     more = """<link name="o"><inertial><mass value="1"/>
     <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>
     </inertial></link>
@@ -204,6 +209,7 @@ def test_a_massless_link_that_carries_two_bodies_remains_a_body(tmp_path):
 
 
 def test_a_massless_link_that_carries_nothing_is_left_out_with_a_note(tmp_path):
+    """The link "horn" at the end of a chain, whose other bodies accelerate as MuJoCo's matrices say."""
     idle = """<link name="horn"/>
     <joint name="j3" type="continuous"><parent link="l"/><child link="horn"/></joint>"""
     found = read(tmp_path, middle("0 1 0", "0 0 1", more=idle), "idle.urdf")
@@ -242,13 +248,14 @@ def open_chain() -> str:
 
 
 def test_note_names_frames_of_two_branches_that_coincide(tmp_path):
+    """They may be the ends of a loop that URDF cannot close."""
     notes = read(tmp_path, open_chain(), "open.urdf").imported.notes
     assert any("'end_a' (on 'two') and 'end_b' (on 'three') coincide" in note for note in notes)
 
 
 def test_close_joins_two_frames_by_a_spherical_joint(tmp_path):
-    """Three bodies with 18 freedoms less the rank of the rows keep one; MuJoCo's matrices get the joint's
-    rows."""
+    """Three bodies with 18 freedoms less the rank of the rows keep one. The scene accelerates as MuJoCo's
+    matrices of the open chain with rows of the joint."""
     found = read(tmp_path, open_chain(), "closed.urdf", close=["end_a=end_b"])
     assert found.imported.scene.joint[-1].type == "spherical" and not found.imported.notes
     assert 18 - rank(found.imported.scene) == 1
@@ -256,6 +263,7 @@ def test_close_joins_two_frames_by_a_spherical_joint(tmp_path):
 
 
 def test_close_reads_pairs_of_frames_from_a_yaml_file(tmp_path):
+    """The joints are those of the same pair on the command line."""
     (tmp_path / "loops.yaml").write_text("closed_loop: [[end_a, end_b]]\ntype: [3d]\n")
     closed = [
         read(tmp_path, open_chain(), "closed.urdf", close=[pairs]).imported.scene.joint
@@ -274,6 +282,7 @@ def test_close_reads_pairs_of_frames_from_a_yaml_file(tmp_path):
     ],
 )
 def test_faulty_argument_of_close_is_refused(pair, says, tmp_path):
+    """The form is frame_a=frame_b:type:axis; the file has frames end_a and end_b."""
     with pytest.raises(SceneError, match=says):
         read(tmp_path, open_chain(), "open.urdf", close=[pair])
 
