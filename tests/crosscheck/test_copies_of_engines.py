@@ -9,6 +9,7 @@ import pytest
 
 from crosscheck.closed_loops.mechanisms import FOLDER
 from crosscheck.conformance.changes.relations import RELATIONS, unchanged
+from crosscheck.conformance.mechanisms.moving import moving_probes
 from crosscheck.engine import Setting, engine, engine_names, installed
 from crosscheck.engines.shared.spanning_tree import spanning_tree
 from crosscheck.judge.metrics import error_series, in_scene_order
@@ -113,6 +114,23 @@ def test_engines_with_generated_code_refuse_a_loop_rotated_out_of_its_coordinate
     out. Rotated, the three rows are not zero but depend on each other: planar motions have two directions."""
     refusal = engine(WAYS[way][0]).cannot(changed_by(copy, way)[0])
     assert refusal is not None and refusal.reason.endswith(" not derived: its closures depend on each other")
+
+
+@pytest.mark.parametrize(
+    ("name", "family"),
+    [("mujoco", "projected"), ("pinocchio", "tuned"), ("drake", "terms"), ("dart", "terms")],
+)
+def test_ball_joint_given_twice_changes_no_motion(name: str, family: str) -> None:
+    """Rows of the second joint are rounding in the coordinates of the engine's tree, and must not limit its
+    accelerations. At the finest settings both motions over 0.02 s differ by less than 1e-9 m or rad."""
+    if not installed(name):
+        pytest.skip(f"{name} is not installed")
+    scene, times = moving_probes()["spherical joint"], np.array([0.0, 0.02])
+    twice = scene.with_(joint=(*scene.joint, scene.joint[-1].model_copy(update={"name": "again"})))
+    setting = engine(name).settings_of(scene, family)[-1]
+    once, again = (engine(name).run(s, times, setting) for s in (scene, twice))
+    assert once.outcome is again.outcome is Outcome.COMPLETED, (once.message, again.message)
+    assert float(error_series(scene, once, again).max()) < 1e-9
 
 
 @pytest.mark.xfail(

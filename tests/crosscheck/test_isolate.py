@@ -87,6 +87,7 @@ def test_every_observed_run_has_a_process_of_its_own_that_ends(tmp_path: Path):
 
 
 def test_an_observed_run_that_hangs_is_killed_with_the_processes_that_it_started(tmp_path: Path):
+    """The engine HANG starts a process, writes its number into a file and sleeps; the limit is 2 s."""
     pid = tmp_path / "pid"
     ended = observe(f"{FAKES}:HANG", still(str(pid)), TIMES, PLAIN, 2.0).value
     assert (ended.outcome, ended.message) == (Outcome.TIMED_OUT, "no result after 2 s"), ended.message
@@ -162,6 +163,7 @@ def test_preparation_of_an_engine_after_a_time_out_does_not_count_against_the_ne
 
 
 def test_an_engine_that_hangs_in_its_preparation_times_out(monkeypatch: pytest.MonkeyPatch):
+    """The engine STUCK sleeps in its preparation, which may take 1 s here."""
     monkeypatch.setattr("crosscheck.processes.pool.READY_SECONDS", 1.0)
     ended = run("STUCK", time_limit=60.0)
     assert (ended.outcome, ended.message) == (Outcome.TIMED_OUT, "no result after 1 s"), ended.message
@@ -237,8 +239,8 @@ def test_stop_all_kills_a_running_child_and_its_run_is_crashed(tmp_path: Path):
 
 
 def test_interleaved_runs_take_turns_in_one_process_after_one_untimed_round(tmp_path: Path):
-    """Job a takes 0.5 s; job b does not complete and has no time. The process that has imported the engine
-    of the first job serves this and the next timing."""
+    """Job a says that it takes 0.5 s; job b does not complete and has no time. Each is run once untimed and
+    twice timed. The process that has imported the first job's engine serves this and the next timing."""
     log = tmp_path / "log"
     _, served = ask(f"{FAKES}:RECORDER", converse, (), 60.0)
     jobs = [
@@ -266,6 +268,7 @@ def test_setting_a_hundred_times_behind_the_fastest_is_timed_once(tmp_path: Path
 
 
 def test_a_crash_among_interleaved_runs_is_raised_with_its_signal():
+    """The second of two engines touches memory that it does not own."""
     jobs = [(f"{FAKES}:FAKE", PLAIN), (f"{FAKES}:SEGFAULT", PLAIN)]
     with pytest.raises(ChildFailed, match="SIGSEGV") as caught:
         time_interleaved(still(), TIMES, jobs, repeats=1, time_limit=60.0)

@@ -65,7 +65,8 @@ CASES = [*((kind, False) for kind in ROWS), *((kind, True) for kind in DRIVERS)]
 @pytest.mark.parametrize("bodies", [PAIR, ("second", "ground")])
 @pytest.mark.parametrize(("kind", "driven"), CASES)
 def test_jacobian_is_finite_difference_of_closure(kind, bodies, driven):
-    """J u - b is the central difference of Φ(q, t) along a random direction u."""
+    """J u - b is the central difference of Φ(q, t) along a random direction u, to 4e-9: ten times the
+    measured error of order h², with h = 1e-5 s."""
     scene = jointed(kind, bodies, (DRIVERS[kind],) if driven else ())
     motion, rates = constrained_motion(scene, 3)
     j, b = constraints.jacobian(scene, 0.0, *motion[:2])
@@ -79,7 +80,8 @@ def test_jacobian_is_finite_difference_of_closure(kind, bodies, driven):
 @pytest.mark.parametrize("bodies", [PAIR, ("ground", "second")])
 @pytest.mark.parametrize(("kind", "driven"), CASES)
 def test_acceleration_residual_is_finite_difference_of_velocity_residual(kind, bodies, driven):
-    """Φ'' is the central difference of Φ' along a motion with random accelerations."""
+    """Φ'' is the central difference of Φ' along a motion with random accelerations, to 2e-8: ten times the
+    measured error of order h², with h = 1e-5 s."""
     scene = jointed(kind, bodies, (DRIVERS[kind],) if driven else ())
     motion, rates = constrained_motion(scene, 11)
     plus, minus = (
@@ -92,7 +94,7 @@ def test_acceleration_residual_is_finite_difference_of_velocity_residual(kind, b
 
 @pytest.mark.parametrize("name", CLOSED)
 def test_initial_velocities_satisfy_joints_and_drivers(name):
-    """Rates of their residuals are rounding, relative to the largest spin of a body, or to 1 rad/s."""
+    """Rates of their residuals are below 4e-14 of the largest spin of a body, or of 1 rad/s: rounding."""
     scene = SCENES[name]()
     velocity, spin = constraints.initial_twists(scene)
     rates = constraints.closure_rates(scene, 0.0, *constraints.initial_poses(scene), velocity, spin)
@@ -102,7 +104,8 @@ def test_initial_velocities_satisfy_joints_and_drivers(name):
 
 @pytest.mark.parametrize("name", [n for n in CLOSED if SCENES[n]().body[0].angular_velocity is not None])
 def test_initial_velocities_keep_given_angular_velocities(name):
-    """Angular velocities of the scene file, which its joints allow, change by rounding only."""
+    """Angular velocities of the scene file, which its joints allow, change by less than 1e-13 of the largest,
+    or of 1 rad/s: rounding."""
     scene = SCENES[name]()
     _, spin = constraints.initial_twists(scene)
     given = {k: body.angular_velocity for k, body in enumerate(scene.body) if body.angular_velocity}
@@ -134,14 +137,9 @@ def test_second_driver_of_a_four_bar_at_another_rate_is_refused():
 
 @pytest.mark.parametrize("order", [("ground", "second"), ("second", "ground")])
 def test_coordinates_of_a_cylindrical_joint_count_its_full_turns(order):
-    """A body turns about its axis by 9 t + 3 sin 4 t, up to 21 rad, and slides by 0.4 t², up to 1.6 m."""
-    got, wanted = cylinder_coordinates(order, np.linspace(0.0, 2.0, 81))
-    assert np.abs(got - wanted).max() < 100 * ROUNDED, f"off by {np.abs(got - wanted).max()} after 21 rad"
-
-
-def cylinder_coordinates(order, times):
-    """The judge's coordinates (k, 2) of a cylindrical joint and those put in: angle (rad), shift (m)."""
-    scene = jointed("cylindrical", order)
+    """A body turns about its axis by 9 t + 3 sin 4 t, up to 21 rad, and slides by 0.4 t², up to 1.6 m. Both
+    are found to 1e-12: rounding of 21 rad."""
+    scene, times = jointed("cylindrical", order), np.linspace(0.0, 2.0, 81)
     angle, shift = 9.0 * times + 3 * np.sin(4 * times), 0.4 * times**2
     axis = np.array(AXIS) / np.linalg.norm(AXIS)
     turn = rotations.from_vector(angle[:, None] * axis)
@@ -152,5 +150,5 @@ def cylinder_coordinates(order, times):
     frames = np.stack([np.broadcast_to(orientation[0], turned.shape), turned], axis=1)
     spin = np.stack([0 * place, (9.0 + 12 * np.cos(4 * times))[:, None] * axis], axis=1)
     sign = 1 if order[0] == "ground" else -1
-    got = constraints.joint_coordinates(scene, times, poses, frames, spin)["j"]
-    return got, sign * np.stack([angle, shift], axis=1)
+    found = constraints.joint_coordinates(scene, times, poses, frames, spin)["j"]
+    assert np.abs(found - sign * np.stack([angle, shift], axis=1)).max() < 100 * ROUNDED

@@ -75,11 +75,11 @@ def thrown_off_a_hinge(off: float) -> Scene:
 
 
 def test_initial_velocity_four_percent_off_a_hinge_is_rounded_onto_it():
-    """0.12 m/s along the axis, of 3 m/s, are taken for rounding."""
+    """0.12 m/s along the axis, 4 % of 3 m/s, are taken for rounding, as anything up to 5 % is."""
     assert constraints.initial_twists(thrown_off_a_hinge(0.04))[0][0] == pytest.approx([0.0, 3.0, 0.0])
 
 
 def test_initial_velocity_six_percent_off_a_hinge_is_refused():
-    """6 % of 3 m/s are 0.18 m/s."""
+    """6 % of 3 m/s are 0.18 m/s along the hinge's axis; up to 5 % would count as rounding."""
     with pytest.raises(SceneError, match=r"joint\[0\] 'A': the given velocities contradict it: off by 0.18"):
         constraints.initial_twists(thrown_off_a_hinge(0.06))

@@ -10,7 +10,8 @@ from tests.helpers.coupled_mechanisms import coupled_loops, gear_pair, pendulum,
 
 @pytest.mark.parametrize("make", [gear_pair, screw, pendulum, coupled_loops])
 def test_coupling_is_a_constraint_row_and_an_armature_is_none(make):
-    """The judge's count is mbref's without rotors, which are hidden bodies of six coordinates and rows."""
+    """The judge's rows, redundant rows and freedoms are mbref's, except for rows of rotors: in mbref each
+    armature is a hidden body with six coordinates and as many rows."""
     scene = make()
     counts, found = mbref.counts(scene), mobility(scene)
     rotors = sum(bool(joint.armature) for joint in scene.joint if hasattr(joint, "armature"))

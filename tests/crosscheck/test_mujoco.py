@@ -6,13 +6,12 @@ import numpy as np
 import psutil
 import pytest
 
-from crosscheck.conformance.mechanisms.moving import moving_probes
 from crosscheck.engine import Setting, engine
 from crosscheck.engines.mujoco.adapter import ENGINE
 from crosscheck.engines.mujoco.context import LIBRARIES, library
 from crosscheck.engines.mujoco.families import ADAPTIVE, HARD
 from crosscheck.engines.mujoco.model import compiled
-from crosscheck.judge.metrics import error_series, order_of_convergence, violation_series
+from crosscheck.judge.metrics import order_of_convergence, violation_series
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Body, Scene
 from mbref.scenes import SCENES
@@ -22,30 +21,25 @@ from tests.helpers.statics import hinge, pendulum
 
 mujoco = pytest.importorskip("mujoco")
 
-PAPER = {  # scene: duration (s), step (s), beta (1/s), measured error (m, rad)
-    "planar_slider_crank": (0.2, 1.2e-5, 2000.0, 3.7e-9),
-    "spatial_slider_crank": (0.02, 3e-6, 8000.0, 2.1e-10),
-    "spatial_slider_crank_driven": (0.2, 2e-5, 1200.0, 1.8e-10),
-    "four_bar": (0.02, 1e-4, 620.0, 1.5e-11),
-    "five_bar": (0.02, 1e-4, 620.0, 1.6e-11),
-    "four_bar_gravity": (0.5, 2e-3, 40.0, 1.5e-10),
-}
-FORWARD = {  # scene: measured error (m, rad) of accelerations integrated outside
-    "planar_slider_crank": 6.1e-11,
-    "spatial_slider_crank": 5.9e-13,
-    "spatial_slider_crank_driven": 7.5e-14,
-}
-
 
 def simulate(scene: Scene, duration: float, family: str, **options) -> Trajectory:
     return engine("mujoco").run(scene, np.linspace(0, duration, 11), Setting(family, options))
 
 
-@pytest.mark.parametrize("name", PAPER)
-def test_tuned_mujoco_stays_within_its_measured_error_of_the_truth(name: str) -> None:
-    """RK4 with hard closures ("tuned"). PAPER has durations, steps, gains and measured errors; 10 times as
-    much is allowed."""
-    duration, step, beta, measured = PAPER[name]
+@pytest.mark.parametrize(
+    ("name", "duration", "step", "beta", "measured"),  # s, s, gain (1/s), measured error (m, rad)
+    [
+        ("planar_slider_crank", 0.2, 1.2e-5, 2000.0, 3.7e-9),
+        ("spatial_slider_crank", 0.02, 3e-6, 8000.0, 2.1e-10),
+        ("spatial_slider_crank_driven", 0.2, 2e-5, 1200.0, 1.8e-10),
+        ("four_bar", 0.02, 1e-4, 620.0, 1.5e-11),
+        ("five_bar", 0.02, 1e-4, 620.0, 1.6e-11),
+        ("four_bar_gravity", 0.5, 2e-3, 40.0, 1.5e-10),
+    ],
+)
+def test_tuned_mujoco_stays_within_its_measured_error_of_the_truth(name, duration, step, beta, measured):
+    """RK4 with hard closures ("tuned"). The error from the judge's truth is at most ten times the measured
+    one."""
     scene = SCENES[name]()
     run = simulate(scene, duration, "tuned", step=step, beta=beta, hard=HARD)
     assert completed_error(run, scene) < MARGIN * measured
@@ -76,13 +70,20 @@ def test_implicitfast_is_offered_for_scenes_with_damping_alone() -> None:
     assert "implicitfast" in {s.family for s in ENGINE.settings(every_joint())}
 
 
-@pytest.mark.parametrize("name", FORWARD)
-def test_integrated_accelerations_of_mujoco_stay_within_their_measured_error(name: str) -> None:
-    """DOP853 of crosscheck integrates MuJoCo's accelerations; FORWARD has the measured errors."""
-    duration, _, beta, _ = PAPER[name]
+@pytest.mark.parametrize(
+    ("name", "duration", "beta", "measured"),  # s, gain (1/s), measured error (m, rad)
+    [
+        ("planar_slider_crank", 0.2, 2000.0, 6.1e-11),
+        ("spatial_slider_crank", 0.02, 8000.0, 5.9e-13),
+        ("spatial_slider_crank_driven", 0.2, 1200.0, 7.5e-14),
+    ],
+)
+def test_integrated_accelerations_of_mujoco_stay_within_their_measured_error(name, duration, beta, measured):
+    """DOP853 of crosscheck integrates MuJoCo's accelerations ("forward"). The error from the judge's truth is
+    at most ten times the measured one."""
     scene = SCENES[name]()
     run = simulate(scene, duration, "forward", rtol=1e-10, min_step=2e-5, beta=beta, hard=1e-7)
-    assert completed_error(run, scene) < MARGIN * FORWARD[name]
+    assert completed_error(run, scene) < MARGIN * measured
 
 
 def test_hardened_closures_are_closer_to_the_truth_than_stock_and_defaults() -> None:
@@ -120,8 +121,8 @@ def test_driver_s_callback_is_removed_after_a_run() -> None:
 
 
 def test_thin_disc_whose_rounded_inertia_violates_the_triangle_inequality_moves_exactly() -> None:
-    """A disc has I_z = I_x + I_y, which rounding exceeds; MuJoCo refuses such bodies. By the free body's
-    closed form the measured error is 1.7e-13 m or rad."""
+    """A disc has I_z = I_x + I_y, which rounding exceeds; MuJoCo refuses such bodies. The error from the free
+    body's closed form is at most ten times the measured 1.7e-13 m or rad."""
     inertia = (0.1, 0.1, 0.2 * (1 + 1e-12))
     disc = Body(name="disc", mass=1, inertia=inertia, position=(0, 0, 0), angular_velocity=(0, 0.1, 5))
     scene = Scene(name="disc", body=(disc,))
@@ -130,15 +131,16 @@ def test_thin_disc_whose_rounded_inertia_violates_the_triangle_inequality_moves_
 
 
 def test_stiff_closures_cross_singular_positions_within_their_measured_error() -> None:
-    """The swinging four-bar is flat at 0.162, 0.664 and 0.989 s. The measured error is 4.5e-14 m or rad."""
+    """The swinging four-bar is flat at 0.162, 0.664 and 0.989 s. The error from the judge's truth is at most
+    ten times the measured 4.5e-14 m or rad."""
     scene = SCENES["four_bar_gravity"]()
     run = simulate(scene, 1.0, "stiff", step=2e-4, beta=1000.0, hard=HARD)
     assert completed_error(run, scene) < MARGIN * 4.5e-14
 
 
 def test_projected_mujoco_crosses_singular_positions_within_its_measured_error() -> None:
-    """The swinging four-bar is flat at 0.162, 0.664 and 0.989 s. Measured: an error of 3.3e-9 m or rad, and
-    joints violated by 4.4e-14 of the scene's length, since each step is projected onto them."""
+    """The swinging four-bar is flat at 0.162, 0.664 and 0.989 s. At most ten times the measured: an error
+    from the judge's truth of 3.3e-9 m or rad, and joints violated by 4.4e-14 of the length."""
     scene = SCENES["four_bar_gravity"]()
     run = simulate(scene, 1.0, "projected", rtol=1e-8, min_step=4e-3, beta=40.0, hard=ADAPTIVE["projected"])
     assert completed_error(run, scene) < MARGIN * 3.3e-9
@@ -146,20 +148,11 @@ def test_projected_mujoco_crosses_singular_positions_within_its_measured_error()
 
 
 def test_projected_mujoco_follows_the_driven_crank() -> None:
-    """The truth is the closed form of the driven slider-crank; the measured error is 3.9e-13 m or rad."""
+    """The error from the closed form of the driven slider-crank is at most ten times the measured 3.9e-13 m
+    or rad."""
     scene = SCENES["spatial_slider_crank_driven"]()
     run = simulate(scene, 0.1, "projected", rtol=1e-8, min_step=1e-4, beta=600.0, hard=ADAPTIVE["projected"])
     assert completed_error(run, scene) < MARGIN * 3.9e-13
-
-
-def test_duplicate_joint_changes_no_projected_motion_of_mujoco() -> None:
-    """A ball joint given twice has dependent rows; motions agree within a tenth of the tolerance, 1e-8."""
-    scene = moving_probes()["spherical joint"]
-    twice = scene.with_(joint=(*scene.joint, scene.joint[-1].model_copy(update={"name": "again"})))
-    tight = {"rtol": 1e-8, "min_step": 6e-3, "beta": 25.0, "hard": ADAPTIVE["projected"]}
-    run, again = (simulate(s, 0.02, "projected", **tight) for s in (scene, twice))
-    assert run.outcome is again.outcome is Outcome.COMPLETED, (run.message, again.message)
-    assert float(error_series(scene, run, again).max()) < 1e-9
 
 
 def test_driver_acts_although_mujoco_renumbers_its_rows():

@@ -75,10 +75,11 @@ def test_solvers_that_need_a_constraint_do_not_serve_a_free_body():
 
 @INSTALLED
 @pytest.mark.slow
-@pytest.mark.parametrize("family", ERRORS)
-def test_newton_s_solver_moves_a_four_bar_within_its_measured_error(family):
-    """Over 0.2 s at steps of 1 ms; ERRORS has the measured errors (of the length)."""
-    assert 0 < error_of_four_bar(family) < MARGIN * ERRORS[family]
+@pytest.mark.parametrize(("family", "measured"), ERRORS.items())
+def test_newton_s_solver_moves_a_four_bar_within_its_measured_error(family, measured):
+    """Over 0.2 s at steps of 1 ms, by the judge's truth; 1.5 times the measured error (of the length) is
+    allowed."""
+    assert 0 < error_of_four_bar(family) < MARGIN * measured
 
 
 @INSTALLED

@@ -92,16 +92,6 @@ def test_terms_of_drake_and_dart_move_and_react_as_the_truth(name: str, label: s
 
 
 @pytest.mark.parametrize("name", [of("drake"), of("dart")])
-def test_duplicate_joint_changes_no_motion_of_drake_and_dart(name: str) -> None:
-    """A ball joint is given twice: the rows of its closure have entries of rounding only, and must not limit
-    the accelerations. The truth is the motion with one."""
-    scene = scenes()["spherical joint"]
-    twice = scene.joint[-1].model_copy(update={"name": "again"})
-    run = simulate(name, scene.with_(joint=(*scene.joint, twice)), TERMS, scene.duration / 16)
-    assert error(scene, run) < LATER
-
-
-@pytest.mark.parametrize("name", [of("drake"), of("dart")])
 def test_driver_beyond_the_reach_ends_a_run_with_a_reason(name: str) -> None:
     """Crank 0.3 m, rod 0.25 m: the crank is driven from 0.2 rad at 4 rad/s and reaches at most asin(0.25 /
     0.3). The run ends within a hundredth of that time; joints and driver are closed to 1e-6 of the length at
