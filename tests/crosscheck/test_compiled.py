@@ -67,10 +67,9 @@ def oscillator(t: float, y: np.ndarray) -> np.ndarray:
 def test_dop853_solves_an_oscillator_within_twenty_tolerances(rtol: float) -> None:
     """y'' = -y from y = 1 at rest: y = cos t. Each of 20 s adds less than one tolerance to the error."""
     times = [0.0, 0.3, 5.0, 20.0]
-    status, reached, samples, memory = integrate(oscillator, [1.0, 0.0], times, rtol)
+    status, reached, samples, _ = integrate(oscillator, [1.0, 0.0], times, rtol)
     assert (status, reached) == (dop853.REACHED, 4)
-    error = abs(samples[:, 0] - np.cos(times)).max()
-    assert error < times[-1] * rtol, f"{error:.1e} off at a tolerance of {rtol:g}, {memory.counts[0]} steps"
+    assert abs(samples[:, 0] - np.cos(times)).max() < times[-1] * rtol
 
 
 def test_error_of_equally_many_steps_falls_with_the_ninth_power_of_their_length() -> None:

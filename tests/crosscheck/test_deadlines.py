@@ -79,8 +79,7 @@ def test_computation_of_a_certified_table_ends_at_its_limit_of_cpu_time():
         with pytest.raises(NotCertified, match=OVER):
             certified(scene, np.linspace(0.0, 0.05, 3), 20, seconds=LIMIT)
 
-    spent = cpu_seconds(table)
-    assert spent < FACTOR * LIMIT + ALLOWED, f"{spent:.1f} s of CPU time, the limit was {LIMIT} s"
+    assert cpu_seconds(table) < FACTOR * LIMIT + ALLOWED
 
 
 def test_the_nearer_of_two_nested_limits_counts():

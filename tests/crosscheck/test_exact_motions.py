@@ -92,9 +92,7 @@ def test_gausss_principle_gives_the_nutation_of_a_heavy_symmetric_top():
 
 def test_moving_probes_of_the_suite_begin_with_closed_joints_and_a_rotating_body():
     """Violations of positions, velocities and accelerations are below 1e-9; a body has above 0.3 rad/s."""
-    for name, scene in PROBES.items():
+    for scene in PROBES.values():
         start = gauss_motion(scene, (0.0,))
-        off = max(float(violation_series(scene, start, level).max()) for level in (0, 1, 2))
-        assert off < 1e-9, f"{name}: joints are off by {off:.1e} at the start"
-        fastest = np.linalg.norm(start.angular_velocity, axis=-1).max()
-        assert fastest > 0.3, f"{name} turns by {fastest:.2g} rad/s"
+        assert max(float(violation_series(scene, start, level).max()) for level in (0, 1, 2)) < 1e-9
+        assert np.linalg.norm(start.angular_velocity, axis=-1).max() > 0.3

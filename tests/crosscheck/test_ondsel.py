@@ -105,8 +105,7 @@ def test_ondsel_moves_every_joint_type_as_pinocchio(swapped: bool) -> None:
     run = simulate(scene, times, 5e-3)
     other = engine("pinocchio").run(scene, times, Setting("tuned", {"rtol": 1e-11, "min_step": 1e-4}))
     assert run.outcome is other.outcome is Outcome.COMPLETED, (run.message, other.message)
-    turned = rotations.angle_between(run.orientation, other.orientation).max()
-    assert turned < MARGIN * 5.2e-14, f"orientations differ by {turned:.1e} rad"
+    assert rotations.angle_between(run.orientation, other.orientation).max() < MARGIN * 5.2e-14
     for field in ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration"):
         ours, theirs = getattr(run, field), getattr(other, field)
         apart = abs(ours - theirs).max() / abs(theirs).max()
@@ -128,8 +127,7 @@ def test_driver_with_a_phase_turns_the_joint_as_prescribed(swapped: bool) -> Non
     assert run.outcome is Outcome.COMPLETED, run.message
     found = joint_coordinates(scene, run.times, run.position, run.orientation, run.angular_velocity)["cyl"]
     prescribed = start - run.times + sine.amplitude * np.sin(5.0 * run.times + 0.4)
-    off = abs(found[:, 0] - prescribed).max()
-    assert off < MARGIN * ROUNDING, f"{off:.1e} rad from the driver's angle"
+    assert abs(found[:, 0] - prescribed).max() < MARGIN * ROUNDING
 
 
 def test_accelerations_of_a_cylinder_on_a_moving_arm_are_left_out_and_its_poses_are_right() -> None:
@@ -177,8 +175,7 @@ def test_ondsel_gives_reactions_only_with_masses_and_without_loads() -> None:
     runs = {scene: simulate(scene, np.array([0.01]), 1e-3) for scene in (base, bare, loaded)}
     assert runs[base].reactions is not None, "no reactions of a scene without loads"
     assert runs[bare].reactions is None and runs[loaded].reactions is None, "reactions of unknown forces"
-    apart = max(abs(run.position - runs[base].position).max() for run in runs.values())
-    assert apart < MARGIN * ROUNDING, f"masses and loads move a driven mechanism by {apart:.1e} m"
+    assert max(abs(run.position - runs[base].position).max() for run in runs.values()) < MARGIN * ROUNDING
 
 
 def test_driver_beyond_the_reach_ends_the_run_with_the_samples_before_the_failure() -> None:

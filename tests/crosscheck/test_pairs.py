@@ -79,8 +79,9 @@ def error(name: str, mechanism: Scene) -> float:
 @pytest.mark.parametrize("name", ENGINES)
 @pytest.mark.parametrize("pair", PAIRS)
 def test_engine_moves_a_mechanism_by_both_of_two_loads_at_one_place(name, pair):
-    """By the motion of Gauss's principle with both loads, the error is below LIKE_TRUTH; with one load alone
-    the principle's motion is off by over 100 times as much. Engines that refuse the pair are skipped."""
+    """The error from the motion of Gauss's principle with both loads is below LIKE_TRUTH, 1e-5 of the length
+    or rad; with one load alone the principle's motion is off by over 100 times as much. Engines that refuse
+    the pair are skipped."""
     assert error(name, scene(load=PAIRS[pair])) < LIKE_TRUTH < least_effect(pair) / 100
 
 
@@ -105,23 +106,19 @@ SECOND_JOINTS = {
 }
 
 
-@pytest.mark.parametrize("name", ENGINES)
-def test_driver_and_torsion_spring_act_in_one_joint(name):
-    """The truth is the motion by Gauss's principle; engines that refuse the scene are skipped."""
-    assert error(name, scene(**DRIVEN_SPRUNG)) < LIKE_TRUTH
+BESIDE = {
+    "driver and torsion spring of one joint": DRIVEN_SPRUNG,
+    "two drivers of one body's joints": {"driver": TWO_DRIVERS},
+    **{f"cylinder {words}": {"joint": (A, C, second)} for words, second in SECOND_JOINTS.items()},
+}
 
 
 @pytest.mark.parametrize("name", ENGINES)
-def test_two_drivers_move_joints_of_one_body(name):
-    """The truth is the motion by Gauss's principle; engines that refuse the scene are skipped."""
-    assert error(name, scene(driver=TWO_DRIVERS)) < LIKE_TRUTH
-
-
-@pytest.mark.parametrize("name", ENGINES)
-@pytest.mark.parametrize("second", SECOND_JOINTS.values(), ids=SECOND_JOINTS)
-def test_two_joints_hold_the_same_two_bodies(name, second):
-    """A cylinder with a distance or a coaxial hinge; the truth is the motion by Gauss's principle."""
-    assert error(name, scene(joint=(A, C, second))) < LIKE_TRUTH
+@pytest.mark.parametrize("parts", BESIDE.values(), ids=BESIDE)
+def test_engine_moves_a_mechanism_with_drivers_and_joints_side_by_side(name, parts):
+    """The error from the motion by Gauss's principle is below LIKE_TRUTH, 1e-5 of the length or rad. Engines
+    that refuse the scene are skipped."""
+    assert error(name, scene(**parts)) < LIKE_TRUTH
 
 
 # engines of first order, in single precision, or without J' v in closures, at a fine step

@@ -23,8 +23,7 @@ def test_panels_reach_rounding_error_over_many_periods():
     """The sine over 48 periods, by y'' = -y, to 1e-14; the solver computes in extended precision."""
     t = np.linspace(0, 300.0, 50)
     got = Solution(lambda y: np.stack([y[:, 1], -y[:, 0]], axis=1), np.array([0.0, 1.0]), 0.1)(t)
-    off = np.abs(got[:, 0].astype(float) - np.sin(t)).max()
-    assert off < 1e-14, f"sine off by {off} after {t[-1]} rad"
+    assert np.abs(got[:, 0].astype(float) - np.sin(t)).max() < 1e-14
 
 
 def test_threads_that_share_a_solution_get_the_states_of_one_thread():

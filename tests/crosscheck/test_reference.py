@@ -88,8 +88,8 @@ def test_bound_of_a_mechanism_far_from_the_origin_holds_the_rounding_of_its_samp
     ],
 )
 def test_reference_is_within_its_bound_of_a_known_motion(name):
-    """The error is the difference from the closed form. The bound is at most SMOOTH, or CROSSED for motions
-    over singular positions (SINGULAR), which magnify rounding."""
+    """The error is the difference from the closed form. The bound is at most 1e-12 of the length or rad, or
+    4e-10 for motions over singular positions (SINGULAR), which magnify rounding."""
     scene = ALL[name]
     found, reason = samples(scene, BRIEF.get(name, scene.duration))
     truth = closed_form(scene)
@@ -100,7 +100,7 @@ def test_reference_is_within_its_bound_of_a_known_motion(name):
 
 def test_reference_with_contradicting_joints_is_within_its_bound_of_the_exact_motion():
     """Bricard's linkage turned askew has rounded axes, which contradict each other; it moves as the exact
-    one, turned."""
+    one, turned. The contradiction exceeds CONSISTENT, the judge's limit for joints without any."""
     scene = SCENES["bricard"]()
     times, turned = np.linspace(0.0, 0.3, 4), Isometry(ASKEW, np.array([0.3, -0.5, 0.2]))
     exact = natural_motion(scene, times, EXTENDED, seconds=SECONDS)
@@ -108,8 +108,7 @@ def test_reference_with_contradicting_joints_is_within_its_bound_of_the_exact_mo
     assert exact.contradiction < module.CONSISTENT < askew.contradiction
     found, reason = judged(turned.change(scene), times, *runs(turned.change(scene), times, SECONDS))
     assert not reason
-    off = np.abs(found.position - turned.place(doubles(exact.position))).max()
-    assert off <= found.bound.max(), f"{off:.1e} from the turned motion, bound {found.bound.max():.1e}"
+    assert np.abs(found.position - turned.place(doubles(exact.position))).max() <= found.bound.max()
 
 
 # --- two formulations -------------------------------------------------------------------------------------
@@ -124,7 +123,7 @@ def test_tree_formulation_passes_the_flat_linkage_of_bennett_in_few_panels():
 
 def test_panels_of_a_stiff_governor_are_as_long_as_its_smooth_motion_allows():
     """Dampers of the governor act in 40 µs, but its motion is smooth: 0.4 s need fewer than 40 panels, where
-    Picard's iteration would take 20 panels to 7 ms. The motion is formulation A's."""
+    Picard's iteration would take 20 panels to 7 ms. The motion is formulation A's to 1e-15 of the length."""
     scene, times = SCENES["flyball_governor"](), np.linspace(0.0, 0.4, 5)
     motion = tree_motion(scene, times, EXTENDED, seconds=SECONDS)
     assert not motion.reason and motion.steps < 40
@@ -141,15 +140,6 @@ def test_choice_of_rows_moves_contradicting_joints_by_rounding_only():
     )
     assert (one.position == same.position).all()
     assert 1e-17 < differences(scene, one, other).max() < 1e-14
-
-
-@pytest.mark.parametrize("seed", [3, 5, *(pytest.param(n, marks=pytest.mark.slow) for n in SEEDS[4:])])
-def test_reference_of_a_random_mechanism_has_a_bound_of_1e_11(seed):
-    """Over 0.3 s; of positions / the scene's length and of angles in rad. The bound covers the difference
-    between two formulations and between two precisions."""
-    found, reason = samples(random_mechanism(seed), 0.3, 4)
-    assert not reason, f"random_{seed}: {reason}"
-    assert found.bound.max() <= 1e-11
 
 
 def test_rows_that_become_dependent_do_not_magnify_contradictions():
@@ -187,8 +177,8 @@ def test_saddle_points_are_solved_to_the_last_digit():
 
 
 def test_twenty_digits_are_certified_by_both_formulations():
-    """The table of a pendulum has a bound of 1e-20, 22 digits or more, and the closed form's places, in
-    double precision."""
+    """The table of a pendulum has a bound of 1e-20, a hash, numbers of 22 digits or more, and the place of
+    the closed form in double precision, to 1e-15 m."""
     pytest.importorskip("flint", reason="python-flint is the extra `certify`")
     scene, exact = pendulum()
     table = certified(scene, np.array([0.0, 0.3]), 20)
@@ -298,7 +288,8 @@ BRIEFLY = [name for name, path in TABLES.items() if json.loads(path.read_text())
     ],
 )
 def test_reference_is_within_its_bound_of_the_certified_table(name):
-    """The table has positions of twenty digits by two other runs, in 30 digits."""
+    """The table has positions of twenty digits by two other runs, in 30 digits. Errors are over the
+    length."""
     scene, table = find_certifiable(name), json.loads(TABLES[name].read_text())
     found, reason = judged(scene, table["times"], *runs(scene, table["times"], SECONDS))
     assert not reason
@@ -323,29 +314,12 @@ def test_reference_names_a_body_that_turns_without_inertia():
     assert motion.reason == "body 'pole' can turn without inertia"
 
 
-def test_formulations_agree_on_a_point_mass_on_a_joint():
-    """A pendulum's bob without moments of inertia turns about the hinge only; motions differ by rounding."""
-    scene, _ = pendulum()
-    bob = scene.body[0].model_copy(update={"inertia": (0.0, 0.0, 0.0)})
-    motion = natural_motion(scene.with_(body=(bob,)), [0.3], EXTENDED, seconds=SECONDS)
-    other = tree_motion(scene.with_(body=(bob,)), [0.3], EXTENDED, seconds=SECONDS)
-    assert differences(scene, motion, other).max() < AGREE
-
-
 def test_reference_moves_massless_bodies_only_if_driven():
     """A mechanism with a free joint and no masses is refused; the driven rhombus without masses is not."""
     motion = natural_motion(undetermined(), [0.1], EXTENDED, seconds=SECONDS)
     assert motion.reason == "bodies without mass have to be driven in every freedom"
     driven = massless(SCENES["four_bar"]()).with_(duration=0.01)
     assert not natural_motion(driven, [0.01], EXTENDED, seconds=SECONDS).reason
-
-
-def test_reference_ends_after_its_cpu_time():
-    """0.2 s of CPU time do not suffice for 50 s of motion: the state at 0 is given, and the time reached."""
-    scene = SCENES["planar_slider_crank"]()
-    motion = natural_motion(scene, np.linspace(0.0, 100.0, 3), EXTENDED, seconds=0.2)
-    assert motion.reason == "the CPU time has passed"
-    assert len(motion.times) == 1 and 0 < motion.reached < 50
 
 
 # --- the cache --------------------------------------------------------------------------------------------

@@ -28,8 +28,7 @@ def test_adaptive_steps_stay_within_ten_tolerances_of_the_cosine(rtol: float) ->
     stepper, y = adaptive(oscillator, rtol), cosine(0.0)
     for t0, t1 in ((0.0, 0.7), (0.7, 0.701), (0.701, 3.0)):
         y = stepper.advance(y, t0, t1)
-        gap = abs(y - cosine(t1)).max()
-        assert gap < 10 * rtol, f"{gap:.1e} from the cosine at {t1}, tolerance {rtol:.0e}"
+        assert abs(y - cosine(t1)).max() < 10 * rtol
 
 
 def test_every_evaluation_of_dop853_is_counted() -> None:
@@ -72,8 +71,7 @@ def test_noise_where_a_shortest_step_is_corrected_does_not_spoil_the_result() ->
 
     stepper = Adaptive(rhs, lambda t, y: y + moved, 1e-6, shortest, np.inf, Counts())
     y = stepper.advance(np.zeros(1), 0.0, 1.0)
-    gap = abs(y[0] - 1.0 - moved * stepper.counts.steps)
-    assert gap < 1e-12, f"{gap:.1e} from the time it is: {stepper.counts}"
+    assert abs(y[0] - 1.0 - moved * stepper.counts.steps) < 1e-12
 
 
 def test_failed_correction_of_a_state_ends_the_run_with_its_reason() -> None:

@@ -97,6 +97,5 @@ def test_ida_turns_a_redundant_crank_by_more_than_a_turn() -> None:
     error from the judge's truth is at most ten times the measured 1.5e-3 m or rad."""
     scene = SCENES["planar_slider_crank"]()
     run = simulate(scene, 0.25, 1e-6, 26)
-    turned = run.angular_velocity[:, 0, 2].mean() * 0.25
-    assert turned > 2 * math.pi, f"the crank has only turned by {turned:.3g} rad"
+    assert run.angular_velocity[:, 0, 2].mean() * 0.25 > 2 * math.pi
     assert completed_error(run, scene) < MARGIN * 1.5e-3

@@ -113,8 +113,8 @@ CASES += [("sundials", name) for name in ("every joint", "driven", "ring univers
 
 @pytest.mark.parametrize(("setting", "name"), CASES)
 def test_engines_move_and_react_by_gauss_s_principle(name: str, setting: str) -> None:
-    """Poses, rates, accelerations, unique reactions and the resultants on each body, relative to the largest;
-    allowed is 10 times the difference measured (MEASURED)."""
+    """Poses, rates, accelerations, unique reactions and the resultants on each body, relative to the largest,
+    over half the scene's time. Ten times the differences of MEASURED are allowed, 1.3e-10 to 7.1e-6."""
     pytest.importorskip(OPTIONAL.get(setting, setting if setting != "forward" else "mujoco"))
     scene, true = ALL[name], exact(name)
     simulator = engine("mujoco" if setting == "forward" else setting)
@@ -129,16 +129,3 @@ def test_engines_move_and_react_by_gauss_s_principle(name: str, setting: str) ->
         off["reactions"] = max(reaction.unique for reaction in compared.joints.values())
         off["resultants"] = compared.resultant
     assert max(off.values()) < MARGIN * MEASURED[setting], (name, setting, off)
-
-
-@pytest.mark.parametrize("name", ["every joint", "spherical", "ring universal", "distance"])
-@pytest.mark.parametrize("rate", ["velocity", "angular_velocity"])
-def test_accelerations_of_pinocchio_are_slopes_of_its_velocities(name: str, rate: str) -> None:
-    """At 0.1 s, by central differences with h = 1e-4 s of the velocities, whose error is of the order h²; the
-    largest measured is 4.5e-7 of the largest acceleration."""
-    h = 1e-4
-    run = engine("pinocchio").run(ALL[name], np.array([0.1 - h, 0.1, 0.1 + h]), FINE["pinocchio"])
-    before, _, after = getattr(run, rate)
-    accelerations = getattr(run, rate.replace("velocity", "acceleration"))
-    off = abs((after - before) / (2 * h) - accelerations[1]).max() / abs(accelerations).max()
-    assert off < MARGIN * 4.5e-7, f"{name}: off by {off:.2e} from the slope of {rate}"

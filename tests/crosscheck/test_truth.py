@@ -40,8 +40,7 @@ def test_coupler_of_a_driven_rhombus_moves_on_a_circle_without_turning(scene, st
     coupler = np.stack([0.25 + 0.5 * np.cos(angle), 0.5 * np.sin(angle), 0 * t], axis=1)
     motion = truth_for(scene).poses(t)
     assert np.abs(motion.position[:, 1] - coupler).max() < ROUNDED
-    turned = rotations.angle_between(motion.orientation[:, 1], np.array([1.0, 0, 0, 0])).max()
-    assert turned < ROUNDED, f"the coupler turned by {turned}"
+    assert rotations.angle_between(motion.orientation[:, 1], np.array([1.0, 0, 0, 0])).max() < ROUNDED
 
 
 def test_four_bar_chain_has_the_published_position_and_velocity():
@@ -60,8 +59,7 @@ def test_driven_spatial_slider_follows_the_paper_s_formula():
     t = np.linspace(0, 0.2, 57)
     angle = 124.8 * t
     wanted = np.sqrt(0.4**2 - (0.1 * np.cos(angle) - 0.15) ** 2 - (0.1 * np.sin(angle)) ** 2)
-    off = np.abs(truth_for(scene).poses(t).position[:, 2, 1] - wanted).max()
-    assert off < ROUNDED, f"slider off by {off}"
+    assert np.abs(truth_for(scene).poses(t).position[:, 2, 1] - wanted).max() < ROUNDED
 
 
 @pytest.mark.parametrize("name", ["planar_slider_crank_equal", "planar_slider_crank_heavy"])
@@ -103,8 +101,7 @@ def test_pendulum_swings_by_the_elliptic_function():
     w, m = math.sqrt(1.2 * 9.81 * length / inertia), math.sin(start / 2) ** 2
     angle = 2 * np.arcsin(math.sqrt(m) * ellipj(w * t + ellipk(m), m)[0])
     wanted = np.stack([length * np.sin(angle), -length * np.cos(angle)], axis=1)
-    off = np.abs(truth_for(scene).poses(t).position[:, 0, :2] - wanted).max()
-    assert off < 10 * ROUNDED, f"pendulum off by {off}"
+    assert np.abs(truth_for(scene).poses(t).position[:, 0, :2] - wanted).max() < 10 * ROUNDED
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -163,8 +160,7 @@ def test_symmetric_top_precesses_about_its_angular_momentum():
     precession = rotations.from_vector(rate * t[:, None] * momentum / np.linalg.norm(momentum))
     relative = rotations.from_vector((4.0 - 0.3 * 4.0 / 0.2) * t[:, None] * np.array(Z))
     wanted = rotations.multiply(precession, relative)
-    off = rotations.angle_between(motion.orientation[:, 0], wanted).max()
-    assert off < 10 * ROUNDED, f"top off by {off} rad"
+    assert rotations.angle_between(motion.orientation[:, 0], wanted).max() < 10 * ROUNDED
 
 
 def test_free_body_falls_and_keeps_energy_and_angular_momentum():
