@@ -17,9 +17,7 @@ class File:
     text: str
     suffix: str
     options: ImportOptions = field(default_factory=ImportOptions)
-    loops: list[tuple[str, np.ndarray, str, np.ndarray]] = field(
-        default_factory=list
-    )  # spherical, no equality
+    loops: list[tuple[str, np.ndarray, str, np.ndarray]] = field(default_factory=list)  # spherical joints
     mimics: list[tuple[str, str, float]] = field(default_factory=list)  # joint, the one it follows, ratio
 
 
@@ -44,21 +42,8 @@ def inertia(random) -> tuple[float, np.ndarray]:
     return float(random.uniform(0.5, 2.0)), turn @ np.diag([a + b, a + c, b + c]) @ turn.T
 
 
-IDIOMS = (
-    "hinge",
-    "hinge",
-    "slide",
-    "ball",
-    "universal",
-    "cylindrical",
-    "planar",
-    "three hinges",
-    "rod",
-    "free",
-    "parallel",
-    "skew",
-    "fixed",
-)
+IDIOMS = ("hinge", "hinge", "slide", "ball", "universal", "cylindrical", "planar", "three hinges", "rod")
+IDIOMS += ("free", "parallel", "skew", "fixed")
 
 
 def motions(idiom: str, random) -> list[tuple[str, np.ndarray, np.ndarray]]:
@@ -98,14 +83,10 @@ def mjcf_tree(random) -> tuple[str, list[str], list[str]]:
             own.append(f'<joint name="{name}" type="{kind}" pos="{numbers(place)}" {turning} {extra}/>')
             hinges += [name] if idiom in ("hinge", "slide") else []
         full = numbers([matrix[0, 0], matrix[1, 1], matrix[2, 2], matrix[0, 1], matrix[0, 2], matrix[1, 2]])
-        own.append(
-            f'<inertial pos="{numbers(random.normal(size=3) * 0.1)}" mass="{mass!r}" fullinertia="{full}"/>'
-        )
-        name, quat = f"b{k}", random.normal(size=4)
-        texts[name] = [
-            f'<body name="{name}" pos="{numbers(random.normal(size=3) * 0.4)}" quat="{numbers(quat)}">',
-            *own,
-        ]
+        centre = numbers(random.normal(size=3) * 0.1)
+        own.append(f'<inertial pos="{centre}" mass="{mass!r}" fullinertia="{full}"/>')
+        name, quat, at = f"b{k}", random.normal(size=4), random.normal(size=3) * 0.4
+        texts[name] = [f'<body name="{name}" pos="{numbers(at)}" quat="{numbers(quat)}">', *own]
         elements[parent].append(name)
         elements[name] = []
         bodies.append(name)
@@ -168,9 +149,7 @@ def mjcf(seed: int) -> File:
         equalities += f'<joint name="gear" joint1="{hinges[0]}" joint2="{hinges[1]}" polycoef="0 2 0 0 0"/>'
     more = ""
     if len(hinges) > 2 and random.uniform() < 0.3:
-        ends = "".join(
-            f'<joint joint="{name}" coef="{float(random.uniform(0.5, 2))!r}"/>' for name in hinges[-2:]
-        )
+        ends = "".join(f'<joint joint="{n}" coef="{float(random.uniform(0.5, 2))!r}"/>' for n in hinges[-2:])
         more += f'<tendon><fixed name="rope">{ends}</fixed></tendon>'
         offset = float(random.uniform(-0.2, 0.2))
         equalities += f'<tendon name="held" tendon1="rope" polycoef="{offset!r} 0 0 0 0"/>'
@@ -198,9 +177,8 @@ def urdf(seed: int) -> File:
         kind = str(random.choice(["continuous", "revolute", "prismatic", "fixed", "middle", "middle"]))
         a = unit(random)
         if kind == "middle":  # a universal joint, or parallel hinges apart
-            b, apart = (
-                (across(random, a), np.zeros(3)) if random.uniform() < 0.5 else (a, across(random, a) * 0.2)
-            )
+            is_universal = random.uniform() < 0.5
+            b, apart = (across(random, a), np.zeros(3)) if is_universal else (a, across(random, a) * 0.2)
             text += f'<link name="m{k}"/>' + _joint(f"i{k}", "continuous", parent, f"m{k}", a, random)
             text += _link(name, random) + _joint(f"j{k}", "continuous", f"m{k}", name, b, None, apart)
         else:
@@ -225,9 +203,8 @@ def _link(name: str, random) -> str:
 def _joint(name, kind, parent, child, axis, random, place=None, mimic=0) -> str:
     place = random.normal(size=3) * 0.3 if place is None else place
     rpy = numbers(random.uniform(-1, 1, 3)) if random is not None else "0 0 0"
-    limit = (
-        '<limit lower="-1" upper="1" effort="1" velocity="1"/>' if kind in ("revolute", "prismatic") else ""
-    )
+    is_limited = kind in ("revolute", "prismatic")
+    limit = '<limit lower="-1" upper="1" effort="1" velocity="1"/>' if is_limited else ""
     follows = f'<mimic joint="j{mimic - 1}" multiplier="2"/>' if mimic and random.uniform() < 0.1 else ""
     return (
         f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
@@ -248,9 +225,8 @@ def _with_loop(file: File, massive: list[str], random) -> File:
     for k, link in enumerate((first, second)):
         at = local(data, model.body(link).id, point)
         ends += [link, at]
-        extra += f'<link name="loop_{k}"/>' + _joint(
-            f"loop_joint_{k}", "fixed", link, f"loop_{k}", [1, 0, 0], None, at
-        )
+        fixed = _joint(f"loop_joint_{k}", "fixed", link, f"loop_{k}", [1, 0, 0], None, at)
+        extra += f'<link name="loop_{k}"/>{fixed}'
     text = file.text.replace("</robot>", f"{extra}</robot>")
     options = ImportOptions(without=file.options.without, close=["loop_0=loop_1"])
     return File(text, ".urdf", options, [tuple(ends)], file.mimics)

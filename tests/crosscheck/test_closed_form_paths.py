@@ -46,9 +46,6 @@ BOX = scene(
 )
 
 
-# --- which scenes have a closed form ----------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     "parts",
     [
@@ -109,9 +106,6 @@ def test_a_body_on_one_hinge_or_on_two_coaxial_hinges_is_not_locked():
     assert locked(PENDULUM.with_(joint=(*PENDULUM.joint, crossed))).name == "locked"
     assert locked(PENDULUM) is None
     assert locked(PENDULUM.with_(joint=(*PENDULUM.joint, pin("B", "ground", "bar", 0.0, 0.0, 0.0)))) is None
-
-
-# --- slider-cranks in space -------------------------------------------------------------------------------
 
 
 def spatial(line: tuple[float, ...], order: str = "crs", reverse: bool = False, way: float = 1.0) -> Scene:
@@ -195,7 +189,6 @@ def test_derivatives_of_the_path_of_a_spatial_slider_crank_are_differences(line,
     assert second.astype(float) == pytest.approx(pose.ddposition[2].astype(float), rel=1e-8, abs=1e-8)
 
 
-# --- motions along a path ---------------------------------------------------------------------------------
 def test_a_weightless_pendulum_turns_at_constant_speed():
     """2 m at -3 rad/s: 6 m/s, and 18 m/s² towards the hinge, also after a quarter turn at π/6 s. Limits are
     some thousand roundings."""

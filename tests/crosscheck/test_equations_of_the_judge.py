@@ -23,7 +23,6 @@ def body(name: str = "b", **parts: object) -> Body:
     return Body(name=name, **given)
 
 
-# --- functions of time ------------------------------------------------------------------------------------
 TABLE = ((0.0, 0.0), (0.3, 0.2), (0.5, -0.1), (0.9, 0.4), (1.4, 0.0))
 
 
@@ -66,9 +65,6 @@ def test_factor_is_zero_outside_its_piece_and_has_the_piece_s_value_at_its_end()
     assert time_functions.value(factor, 0.8, since=0.4) == pytest.approx(2.6)
 
 
-# --- joints -----------------------------------------------------------------------------------------------
-
-
 def residual(given: dict, place, q) -> list[float]:
     """Return residuals (m, rad) of a joint between the ground and a body at a pose, for an anchor at 0."""
     scene = Scene(name="s", body=(body(),), joint=(given,))
@@ -103,9 +99,6 @@ def test_residuals_of_joints_are_displacements_and_angles_that_they_prevent():
     assert residual(at_origin("planar", axis=Z), moved, about(Y, -0.3)) == pytest.approx([0.3, -0.3, 0.0])
 
 
-# --- coordinates ------------------------------------------------------------------------------------------
-
-
 SAMPLED = 0.2 * np.arange(6)  # s
 
 
@@ -124,7 +117,6 @@ def at_rest(scene: Scene):
     return places, np.tile(UNIT, (len(places), 1)), 0 * places, 0 * places, np.zeros(0)
 
 
-# --- terms ------------------------------------------------------------------------------------------------
 def pendulum() -> Scene:
     hinge = Revolute(name="J", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
     spring = TorsionSpring(joint="J", stiffness=3.0, damping=0.5, natural_angle=0.1)

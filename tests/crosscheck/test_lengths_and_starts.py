@@ -25,7 +25,6 @@ def hinge(name: str = "A", first: str = "ground", second: str = "b", **parts: An
     return Revolute(name=name, bodies=(first, second), **{"anchor": O, "axis": Z, **parts})
 
 
-# --- lengths ----------------------------------------------------------------------------------------------
 def test_scene_length_is_the_largest_distance_of_anchors_and_centres():
     """Points (3, 4, 0) and the origin; (3, 4, 0) and (0, 0, -6), √(5² + 6²) apart; centres 7 m apart."""
     bar = Distance(name="D", bodies=("ground", "b"), anchors=((0.0, 0.0, -6.0), (3.0, 4.0, 0.0)))
@@ -53,7 +52,6 @@ def test_length_of_a_single_body_is_its_way_or_its_radius_of_gyration(parts, mor
     assert constraints.scene_length(scene(body(**parts), **{"duration": 1, **more})) == pytest.approx(length)
 
 
-# --- rows -------------------------------------------------------------------------------------------------
 PARTS = scene(
     body("b", 1.0, 0.0, 0.0),
     body("c", 3.0, 0.0, 0.0),

@@ -136,23 +136,13 @@ def test_no_code_is_shown_for_families_that_crosscheck_integrates(name):
 def test_fastest_run_within_the_level_is_chosen_otherwise_the_most_accurate():
     """Engine a has three runs of family "own" within the error 1e-6: the one of 1 s, error 5e-7, is chosen,
     and family "ours" is excluded. Engine b has none within it: the one of least error is chosen."""
-
-    def record(engine: str, error: float, seconds: float, family: str = "own") -> dict[str, Any]:
-        return {
-            "engine": engine,
-            "family": family,
-            "outcome": "COMPLETED",
-            "metrics": {"error": error},
-            "cost": {"seconds": seconds},
-        }
-
+    runs = [  # engine, family, error, seconds
+        ("a", "own", 1e-9, 3.0), ("a", "own", 5e-7, 1.0), ("a", "own", 1e-7, 2.0), ("a", "ours", 1e-8, 0.1),
+        ("b", "own", 1e-2, 0.1), ("b", "own", 1e-4, 0.2),
+    ]  # fmt: skip
     records = [
-        record("a", 1e-9, 3.0),
-        record("a", 5e-7, 1.0),
-        record("a", 1e-7, 2.0),
-        record("a", 1e-8, 0.1, "ours"),
-        record("b", 1e-2, 0.1),
-        record("b", 1e-4, 0.2),
+        {"engine": e, "family": f, "outcome": "COMPLETED", "metrics": {"error": x}, "cost": {"seconds": s}}
+        for e, f, x, s in runs
     ]
     found = Judged(SCENE, {}, records).within(1e-6, lambda r: r["family"] == "own")
     assert {name: r["metrics"]["error"] for name, r in found.items()} == {"a": 5e-7, "b": 1e-4}

@@ -66,9 +66,6 @@ def errors(scene: Scene, found: Reference, exact: Trajectory) -> np.ndarray:
     return metrics.error_series(scene, trajectory(scene, found), exact)
 
 
-# --- closed forms -----------------------------------------------------------------------------------------
-
-
 def test_bound_of_a_mechanism_far_from_the_origin_holds_the_rounding_of_its_samples():
     """A pendulum 1e6 m from the origin: its samples in extended precision are rounded to doubles, by up to
     1e-10 of its length, which is more than 1e-12; the bound is larger than that, and below 1e-9."""
@@ -111,9 +108,6 @@ def test_reference_with_contradicting_joints_is_within_its_bound_of_the_exact_mo
     assert np.abs(found.position - turned.place(doubles(exact.position))).max() <= found.bound.max()
 
 
-# --- two formulations -------------------------------------------------------------------------------------
-
-
 def test_tree_formulation_passes_the_flat_linkage_of_bennett_in_few_panels():
     """One of two rows that close Bennett's linkage vanishes where it is flat; a solver that keeps this row
     needs many short panels in 1 s, and one that changes rows fewer than 10."""
@@ -150,9 +144,6 @@ def test_rows_that_become_dependent_do_not_magnify_contradictions():
     scene = drawn.with_(load=(*drawn.load, spring))
     one, other = (natural_motion(scene, [0.5], EXTENDED, seconds=SECONDS, seed=n) for n in (0, 2))
     assert 0 < differences(scene, one, other).max() < 2e-15
-
-
-# --- precisions -------------------------------------------------------------------------------------------
 
 
 def test_double_precision_gives_thirteen_digits():
@@ -298,7 +289,6 @@ def test_reference_is_within_its_bound_of_the_certified_table(name):
     assert (off <= found.bound).all()
 
 
-# --- motions without a reference --------------------------------------------------------------------------
 def test_reference_from_a_singular_position_is_refused_with_the_remedy():
     """The straight four-bar has two motions from its start; the reason asks for a later time; no sample."""
     times = np.linspace(0.0, 1e-4, 3)  # within the first step
@@ -322,7 +312,6 @@ def test_reference_moves_massless_bodies_only_if_driven():
     assert not natural_motion(driven, [0.01], EXTENDED, seconds=SECONDS).reason
 
 
-# --- the cache --------------------------------------------------------------------------------------------
 @pytest.fixture
 def own_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
@@ -380,7 +369,6 @@ def test_reference_needs_no_cache_that_can_be_written(tmp_path, monkeypatch):
     assert np.abs(found.position[0] - exact(np.array([0.5]))[0][0]).max() < AGREE
 
 
-# --- the truth of a scene ---------------------------------------------------------------------------------
 def test_truth_of_a_scene_without_closed_form_is_its_reference(own_cache):
     """A random mechanism has none: its truth is the reference, or None without CPU time. The rhombus has the
     parallelogram's closed form."""

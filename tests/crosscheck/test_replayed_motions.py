@@ -45,7 +45,6 @@ def motion(times: tuple[float, ...] = (0.0, 2.0), **parts: Any) -> Trajectory:
     return Trajectory("s", "e", "1", "m", {}, np.array(times), ("b", "c"), **given)
 
 
-# --- a driver replaced by its moment ----------------------------------------------------------------------
 CRANK = Revolute(name="crank", bodies=("ground", "b"), anchor=(1.0, 2.0, 0.0), axis=(0.0, 0.0, 2.0))
 DRIVER = Driver(joint="crank", polynomial=(0.0, 1.0))
 

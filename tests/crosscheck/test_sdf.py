@@ -158,77 +158,70 @@ HINGE = """<joint name="{name}" type="{kind}"><parent>{parent}</parent><child>{c
 <axis><xyz>0 1 0</xyz>{more}</axis></joint>"""
 
 
-def pair(kind: str = "revolute", more: str = "", joint: str = "") -> str:
+def pair(joint: str = "") -> str:
+    """Return a file of two links, a on hinge A of the world and b on hinge B of a, and a further element."""
     links = LINK.format(name="a", pose="0 0 1 0 0 0", centre="0.1 0 0")
     links += LINK.format(name="b", pose="0.3 0 1 0 0 0", centre="0.1 0 0")
     first = HINGE.format(name="A", kind="revolute", parent="world", child="a", more="")
-    second = HINGE.format(name="B", kind=kind, parent="a", child="b", more=more)
+    second = HINGE.format(name="B", kind="revolute", parent="a", child="b", more="")
     return f'<sdf version="1.7"><model name="m">{links}{first}{second}{joint}</model></sdf>'
 
 
-DYNAMICS = (
-    "<dynamics><damping>0.1</damping><spring_stiffness>2</spring_stiffness>"
-    "<spring_reference>0.3</spring_reference></dynamics>"
-)
+A_AT, A_TO_B = "<pose>0 0 1 0 0 0<", "<parent>a</parent><child>b</child>"  # link a; ends of joint B
+B_IS, B_AXIS = 'name="B" type="revolute">', "<child>b</child>\n<axis><xyz>0 1 0</xyz>"
+FAULTS = [  # text of `pair`, the text in its place, the error's words
+    ("</sdf>", "", "is no XML"),
+    (B_IS, 'name="B" type="gear">', "joint 'B': type 'gear' is none of"),
+    (B_IS, 'name="B" type="gearbox">', "joint 'B': a gearbox needs gearbox_reference_body"),
+    (B_IS, 'name="B" type="screw"><thread_pitch>0</thread_pitch>', "thread_pitch must not be 0"),
+    (
+        B_AXIS,
+        f'{B_AXIS}<mimic joint="A"><multiplier>0</multiplier></mimic>',
+        "mimic multiplier must not be 0",
+    ),
+    (A_TO_B, A_TO_B.replace(">a<", ">c<"), "joint 'B': the file has no link or frame 'c'"),
+    (A_AT, A_AT.replace("<pose", '<pose relative_to="q"'), "frame 'q': the model has"),
+    (A_AT, A_AT.replace("<pose", '<pose relative_to="a"'), "relative to itself, by a → a"),
+    (A_AT, A_AT.replace("<pose", '<pose rotation_format="axis"'), "rotation_format 'axis' is none"),
+    (A_AT, "<pose>0 0 1<", "link 'a': pose: must be 6 numbers, got '0 0 1'"),
+    (
+        "</model>",
+        "<include><uri>model://x</uri></include></model>",
+        "include 'model://x': is none of .*/x, .*/x",
+    ),
+    ("</model>", "<include><uri>https://x.org/y</uri></include></model>", "download the model first"),
+    ("</model>", "<include><uri>model.sdf</uri></include></model>", "model.sdf includes itself"),
+    (
+        "</model>",
+        "<include merge='1'><uri>x</uri></include></model>",
+        "include 'x': merge='true' is not read",
+    ),
+    (A_TO_B, "<child>b</child>", "joint 'B': names no parent"),
+    (A_TO_B, A_TO_B.replace(">b<", ">a<"), "joint 'B': both sides are on link 'a'"),
+    ("<mass>0.5<", "<mass>0<", "link 'a': mass must be positive, got 0"),
+    ("<inertial>", '<inertial auto="true">', "link 'a': inertial auto='true' is not read"),
+    ('name="m"', 'name="m" placement_frame="a"', "model 'm': has a placement_frame"),
+    ("1.7", "new", "version 'new': is no version of SDF"),
+]
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("<sdf>", "is no XML"),
-        ("<sdf><world name='w'/></sdf>", "has no model"),
-        (pair("gear"), "joint 'B': type 'gear' is none of"),
-        (pair("gearbox"), "joint 'B': a gearbox needs gearbox_reference_body"),
-        (
-            pair("screw").replace("<axis>", "<thread_pitch>0</thread_pitch><axis>"),
-            "thread_pitch must not be 0",
-        ),
-        (pair().replace("<parent>a<", "<parent>c<"), "joint 'B': the file has no link or frame 'c'"),
-        (
-            pair().replace("<pose>0 0 1 0 0 0<", '<pose relative_to="q">0 0 1 0 0 0<'),
-            "frame 'q': the model has",
-        ),
-        (
-            pair().replace("<pose>0 0 1 0 0 0<", "<pose>0 0 1<"),
-            "link 'a': pose: must be 6 numbers, got '0 0 1'",
-        ),
-        (
-            pair().replace("<pose>0 0 1 0 0 0<", '<pose relative_to="a">0 0 1 0 0 0<'),
-            "relative to itself, by a → a",
-        ),
-        (pair(joint="<include><uri>model://x</uri></include>"), "include 'model://x': is none of .*/x, .*/x"),
-        (pair(joint="<include><uri>https://x.org/y</uri></include>"), "download the model first"),
-        (pair(joint="<include><uri>model.sdf</uri></include>"), "model.sdf includes itself"),
-        (pair(joint="<include merge='1'><uri>x</uri></include>"), "include 'x': merge='true' is not read"),
-        (pair().replace("<parent>a</parent>", ""), "joint 'B': names no parent"),
-        (pair().replace("<child>b<", "<child>a<"), "joint 'B': both sides are on link 'a'"),
-        (pair().replace("<mass>0.5<", "<mass>0<"), "link 'a': mass must be positive, got 0"),
-        (
-            pair().replace("<inertial>", '<inertial auto="true">'),
-            "link 'a': inertial auto='true' is not read",
-        ),
-        (pair().replace('name="m"', 'name="m" placement_frame="a"'), "model 'm': has a placement_frame"),
-        (
-            pair().replace("<pose>0 0 1", '<pose rotation_format="axis">0 0 1'),
-            "rotation_format 'axis' is none",
-        ),
-        (pair().replace("1.7", "new"), "version 'new': is no version of SDF"),
-        (
-            pair()
-            .replace("<model", "<model name='f'><static>1</static><link name='p'/></model><!--")
-            .replace("</model></sdf>", "--></sdf>"),
-            "has no body that moves",
-        ),
-        (
-            pair(more='<mimic joint="A"><multiplier>0</multiplier></mimic>'),
-            "joint 'B': mimic multiplier must not be 0",
-        ),
-    ],
-)
-def test_faulty_sdf_is_refused_with_the_element_s_name(text, says, tmp_path):
-    """The text of the file, and the element and fault that the error names."""
+@pytest.mark.parametrize(("old", "new", "says"), FAULTS, ids=[says for *_, says in FAULTS])
+def test_faulty_sdf_is_refused_with_the_element_s_name(old, new, says, tmp_path):
+    """A file of links a and b on hinges A and B with one faulty text; the error names the element and
+    fault."""
+    assert old in pair()
     with pytest.raises(SceneError, match=says.replace("(", r"\(")):
-        read(tmp_path, text)
+        read(tmp_path, pair().replace(old, new))
+
+
+STATIC = "<model name='f'><static>1</static><link name='p'/></model>"
+
+
+@pytest.mark.parametrize(("model", "says"), [("", "has no model"), (STATIC, "has no body that moves")])
+def test_sdf_without_a_moving_body_is_refused(model, says, tmp_path):
+    """A world without a model, or with a static one."""
+    with pytest.raises(SceneError, match=says):
+        read(tmp_path, f"<sdf version='1.7'><world name='w'>{model}</world></sdf>")
 
 
 def test_keyframe_of_an_sdf_file_is_refused(tmp_path):

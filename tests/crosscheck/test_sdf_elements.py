@@ -31,7 +31,6 @@ def hinge(more: str = "", kind: str = "revolute", ends: str = "", name: str = "j
     return f'<joint name="{name}" type="{kind}">{ends}{tags}</joint>'
 
 
-# --- Links ------------------------------------------------------------------------------------------------
 def test_links_without_inertial_and_worlds_without_gravity_get_sdf_s_defaults(tmp_path: Path) -> None:
     """1 kg and 1 kg m² about each axis; 9.8 m/s² downwards. Notes say so, for a link without ``inertial``."""
     bare = '<link name="b"/><link name="c"><inertial/></link>'
@@ -65,7 +64,6 @@ def test_link_element_that_changes_the_motion_is_refused_or_left_out(old, new, k
     assert found.left_out == (f"{sentence} (--without {kind})",)
 
 
-# --- Joints -----------------------------------------------------------------------------------------------
 DYNAMICS = (
     "<dynamics><damping>0.5</damping><friction>0</friction><spring_reference>0.25</spring_reference>"
     "<spring_stiffness>3</spring_stiffness></dynamics>"

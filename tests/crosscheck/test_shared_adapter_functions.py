@@ -25,9 +25,6 @@ def scene(*bodies: Body, **parts: Any) -> Scene:
     return Scene(**{"name": "s", "body": bodies or (body(),), "joint": (HINGE,), "duration": 2.0, **parts})
 
 
-# --- steps ------------------------------------------------------------------------------------------------
-
-
 def test_switched_and_tabulated_loads_are_refused_for_steps_that_cannot_end_there():
     """A step has to end where a factor over time is switched on or passes a point of its table, at 0.5 s or 1
     s of the 2 s; a factor with a sine is smooth and needs no end of a step."""
@@ -41,7 +38,6 @@ def test_switched_and_tabulated_loads_are_refused_for_steps_that_cannot_end_ther
         assert found.reason.startswith("load[1] follows a table or is switched")
 
 
-# --- samples ----------------------------------------------------------------------------------------------
 def sampled(t: float, **parts: Any) -> Sample:
     zero = np.zeros((1, 3))
     given = {"position": zero + t, "orientation": np.array([[1.0, 0, 0, 0]]), "acceleration": zero}
@@ -70,7 +66,6 @@ def test_run_that_fails_keeps_its_samples_and_states_the_reason():
     assert lost.message == "the motion is not finite at 2 s"
 
 
-# --- compilers and code -----------------------------------------------------------------------------------
 def test_compiler_is_the_environment_variable_s_or_the_first_installed(monkeypatch):
     """Only the program "two" is installed, not "one". An empty variable CC counts as none."""
     compiler = Compiler("C", "CC", ("one", "two"))
