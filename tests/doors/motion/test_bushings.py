@@ -8,7 +8,8 @@ from crosscheck.judge.gauss_principle import gauss
 from mbref import Scene, simulate
 from mbref.cli.commands import main
 from mbref.method import MethodError
-from tests.helpers.statics import DOWN, G, hinge, pendulum, rod, slide
+from tests.helpers.parts import spring
+from tests.helpers.statics import G, pendulum, rod, slide
 
 MASS, STIFFNESS, DAMPING, SPEED = 2.0, 80.0, 6.0, 1.5  # kg, N/m, N s/m, m/s
 TIMES = [0.1, 0.5, 1.0, 2.0]
@@ -16,24 +17,13 @@ EXACT = 1e-8  # m or rad: errors of steps at the default tolerance add up to les
 
 
 def bushing(body: str, place) -> dict:
-    return {
-        "type": "spring",
-        "bodies": ["ground", body],
-        "points": [list(place), list(place)],
-        "stiffness": STIFFNESS,
-        "damping": DAMPING,
-        "natural_length": 0.0,
-    }
+    return spring("ground", place, body, place, STIFFNESS, 0.0, DAMPING)
 
 
 def on_a_slide() -> Scene:
     block = {**rod("block", (0.0, 0.0, 0.0), MASS), "velocity": [SPEED, 0.0, 0.0]}
-    return Scene(
-        name="bushing",
-        body=[block],
-        joint=[slide("S", "block", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))],
-        load=[bushing("block", (0.0, 0.2, 0.0))],
-    )
+    joint, load = slide("S", "block", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), bushing("block", (0.0, 0.2, 0.0))
+    return Scene(name="bushing", body=[block], joint=[joint], load=[load])
 
 
 def test_a_block_on_a_bushing_moves_as_a_damped_oscillator_and_the_message_names_the_bushing():
@@ -80,11 +70,5 @@ def test_acceleration_by_the_judge_has_the_damping_of_a_bushing_whose_ends_part(
     """The block's is -c v / m. A pendulum at rest has -m g l² / I, as without its bushing: a division by the
     length zero would fail the test by its warning. Both are exact to rounding."""
     assert gauss(on_a_slide())[0, 0] == pytest.approx(-DAMPING / MASS * SPEED, rel=1e-12)
-    hanging = Scene(
-        name="rest",
-        gravity=DOWN,
-        body=[rod("rod", (0.7, 0.0, 0.0))],
-        joint=[hinge("A", ("ground", "rod"))],
-        load=[bushing("rod", (1.0, 0.0, 0.0))],
-    )
-    assert gauss(hanging)[0, 1] == pytest.approx(-MASS * G * 0.7**2 / (0.3 + MASS * 0.7**2), rel=1e-12)
+    level = pendulum((0.7, 0.0, 0.0), load=[bushing("rod", (1.0, 0.0, 0.0))])
+    assert gauss(level)[0, 1] == pytest.approx(-MASS * G * 0.7**2 / (0.3 + MASS * 0.7**2), rel=1e-12)

@@ -22,38 +22,26 @@ CLOSE = 1e-10  # rad and m of angles up to 20 rad
 
 def differential(**changes) -> Scene:
     """Two shafts and the cage of a differential, on fixed axes: φ_A + φ_B = 2 φ_C."""
-    shafts = zip("abc", INERTIAS.tolist(), strict=True)
-    scene = {
-        "name": "differential",
-        "duration": 2.0,
-        "body": [body(name, 1.0, [inertia] * 3, (k, 0.0, 0.0)) for k, (name, inertia) in enumerate(shafts)],
-        "joint": [hinge(name.upper(), "ground", name, (k, 0.0, 0.0)) for k, name in enumerate("abc")],
-        "coupling": [{"name": "gears", "joints": ["A", "B", "C"], "ratios": RATIOS.tolist()}],
-        "load": [
-            {"type": "moment", "body": n, "moment": [0.0, 0.0, t]}
-            for n, t in zip("abc", TORQUES, strict=True)
-        ],
-    }
-    return Scene(**{**scene, **changes})
+    bodies, joints, loads = [], [], []
+    for k, (name, inertia, torque) in enumerate(zip("abc", INERTIAS.tolist(), TORQUES.tolist(), strict=True)):
+        bodies.append(body(name, 1.0, [inertia] * 3, (k, 0.0, 0.0)))
+        joints.append(hinge(name.upper(), "ground", name, (k, 0.0, 0.0)))
+        loads.append({"type": "moment", "body": name, "moment": [0.0, 0.0, torque]})
+    gears = [{"name": "gears", "joints": ["A", "B", "C"], "ratios": RATIOS.tolist()}]
+    parts = {"duration": 2.0, "body": bodies, "joint": joints, "coupling": gears, "load": loads}
+    return Scene(name="differential", **parts | changes)
 
 
 def hoist() -> Scene:
     """Two weights on a rope over a drum: x_A + x_C = r φ_B, r = 50 mm, a row in m as its last coordinate."""
+    places = {"left": (-1.0, 0.0, 0.0), "drum": (0.0, 1.0, 0.0), "right": (1.0, 0.0, 0.0)}
+    masses = {"left": (3.0, 0.1), "drum": (2.0, 0.02), "right": (1.0, 0.1)}  # kg, kg m²
+    bodies = [body(name, masses[name][0], [masses[name][1]] * 3, at) for name, at in places.items()]
+    makers = zip("ABC", (slide, hinge, slide), places.items(), (Y, Z, Y), strict=True)
+    joints = [maker(joint, "ground", name, at, axis) for joint, maker, (name, at), axis in makers]
+    rope = {"name": "rope", "joints": ["A", "B", "C"], "ratios": [1.0, "-50 mm/rad", 1.0]}
     return Scene(
-        name="hoist",
-        gravity=(0, -9.81, 0),
-        duration=1.0,
-        body=[
-            body("left", 3.0, [0.1] * 3, (-1.0, 0.0, 0.0)),
-            body("drum", 2.0, [0.02] * 3, (0.0, 1.0, 0.0)),
-            body("right", 1.0, [0.1] * 3, (1.0, 0.0, 0.0)),
-        ],
-        joint=[
-            slide("A", "ground", "left", (-1.0, 0.0, 0.0), Y),
-            hinge("B", "ground", "drum", (0.0, 1.0, 0.0), Z),
-            slide("C", "ground", "right", (1.0, 0.0, 0.0), Y),
-        ],
-        coupling=[{"name": "rope", "joints": ["A", "B", "C"], "ratios": [1.0, "-50 mm/rad", 1.0]}],
+        name="hoist", gravity=(0, -9.81, 0), duration=1.0, body=bodies, joint=joints, coupling=[rope]
     )
 
 

@@ -31,7 +31,8 @@ def test_default_method_is_sparse_matrices_for_large_mechanisms_of_small_loops_a
 
 
 def test_mechanism_with_a_massless_link_or_a_driver_moves_by_taylor_by_default():
-    """Without either, the default is sparse matrices (alf-dual), which cannot solve for massless links."""
+    """Without either, the default is sparse matrices (alf-dual), which cannot solve for massless links, and
+    which end at the dead position of a driver."""
     scene = find_scene("strandbeest[6]")
     assert default_method(scene).startswith("alf-dual")
     link = scene.body[1].model_copy(update={"mass": 0.0, "inertia": (0.0, 0.0, 0.0)})

@@ -13,13 +13,13 @@ from crosscheck.judge.reference.piecewise import motion_by
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref import Scene, SceneError
-from mbref.motions.event import Event
 from tests.helpers.coupled_mechanisms import body
 from tests.helpers.parts import X, Z, hinge, slide
 
 G, ORIGIN = 10.0, (0.0, 0.0, 0.0)
-ROUNDED = 1e-13  # of times, places and velocities of about 1 s, m and m/s
-BY_STEPS = 1e-10  # of methods whose steps have the default tolerance
+ROUNDED = 1e-13  # s, m, m/s: 500 roundings of times, places and velocities near 1
+SOLVED = 1e-10  # N, m/s: forces and velocities after equations whose condition costs three digits
+BY_STEPS = 1e-10  # s, of methods whose steps have the default tolerance
 STEPPED = pytest.param("alf-dual+projection/dop853", BY_STEPS, marks=pytest.mark.slow)
 
 
@@ -53,7 +53,9 @@ def pushed() -> Scene:
 
 @pytest.mark.parametrize(("method", "close"), [("taylor", ROUNDED), STEPPED])
 def test_bounces_follow_each_other_in_a_geometric_series(method, close):
-    """t₀ = √(2 h / g), then flights 2 eᵏ t₀; impulses m (1 + e) eᵏ⁻¹ g t₀; kinetic energies fall by e²."""
+    """A mass m = 2 kg falls by h = 1 m with g = 10 m/s² and e = 0.5: at t₀ = √(2 h / g) = 0.447 s, and after
+    flights of 2 eᵏ t₀, k = 1, 2, …, of which four end before 1.3 s. Impulses are m (1 + e) eᵏ g t₀, up to 13
+    N s, and kinetic energies fall by e²; both are relative to the last small bounces exact to 100 times."""
     e, t0 = 0.5, np.sqrt(2 / G)
     motion = mbref.simulate(ball(e, 1.3), method, times=[0.0, 1.3])
     count = len(motion.events)
@@ -62,34 +64,36 @@ def test_bounces_follow_each_other_in_a_geometric_series(method, close):
     times = np.array([event.time for event in motion.events])
     assert np.abs(times - t0 - np.append(0.0, np.cumsum(flights))).max() <= close
     impulses = 2.0 * (1 + e) * e ** np.arange(count) * G * t0
-    assert np.abs(motion.impulses["S"][:, 2] - impulses).max() <= 100 * close
-    assert all(abs(event.energy_after / event.energy_before - e**2) <= 1e-8 for event in motion.events)
+    assert motion.impulses["S"][:, 2] == pytest.approx(impulses, rel=100 * close)
+    shares = [event.energy_after / event.energy_before for event in motion.events]
+    assert shares == pytest.approx([e**2] * count, rel=100 * close)
 
 
 def test_bounces_without_end_become_a_contact_that_carries_the_weight():
-    """They end at t₀ (1 + e) / (1 - e), without the flights below 1e-6 of the end time."""
+    """With e = 0.2 they end at t₀ (1 + e) / (1 - e) = 1.5 t₀. Flights below 1e-6 of the end time, 1 s, are
+    left out, some 1e-6 s together. The contact at -1 m carries 2 kg · 10 m/s²."""
     motion = mbref.simulate(ball(0.2, 1.0), "taylor", times=[0.0, 0.9, 1.0])
     last = motion.events[-1]
     assert (last.stops, last.contacts, last.chatter) == (("S.lower",),) * 3 and "bounces end" in last.sentence
-    assert abs(last.time - 1.5 * np.sqrt(2 / G)) <= 1e-5
-    assert np.abs(motion.position[1:, 0, 2] + 1.0).max() <= 1e-11
-    assert np.abs(motion.joint("S").force[1:, 2] - 2.0 * G).max() <= 1e-9
-    assert Event.from_record(last.to_record()).contacts == last.contacts
+    assert abs(last.time - 1.5 * np.sqrt(2 / G)) <= 1e-5  # s
+    assert np.abs(motion.position[1:, 0, 2] + 1.0).max() <= SOLVED
+    assert np.abs(motion.joint("S").force[1:, 2] - 2.0 * G).max() <= 10 * SOLVED
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.6])
 def test_falling_rod_rebounds_by_its_restitution(restitution):
-    """I ω² / 2 = m g l sin 2 before the stop, and e ω after it; with e = 0 the rod stays there."""
-    inertia, motion = 0.2 + 2.0 * 0.25, mbref.simulate(door(restitution), "taylor", times=[0.0, 0.9])
-    speed = np.sqrt(2 * 2.0 * G * 0.5 * np.sin(2.0) / inertia)
-    event = motion.events[0]
+    """From level, a rod of m = 2 kg with its centre at l = 0.5 m falls onto a stop at -2 rad. There I ω² / 2
+    = m g l sin 2 with I = 0.2 kg m² + m l², and e ω after it. The judge finds the impulse in balance."""
+    motion = mbref.simulate(door(restitution), "taylor", times=[0.0, 0.9])
+    event, speed = motion.events[0], np.sqrt(2 * 2.0 * G * 0.5 * np.sin(2.0) / 0.7)
     assert abs(event.angles["A"] + 2.0) <= ROUNDED
-    assert abs(event.angular_velocity_after[0, 2] - restitution * speed) <= 1e-10
+    assert abs(event.angular_velocity_after[0, 2] - restitution * speed) <= SOLVED
     assert measure(door(restitution), motion, None)["impact_error"] <= ROUNDED
 
 
 def test_contact_ends_when_its_force_would_pull():
-    """x = -(t - 1)³ / 12 from 1 s on, when the force changes its sign; the reaction is the push before."""
+    """A force of 1 - t N pushes 2 kg against a stop up to 1 s, and the reaction is its opposite. From then on
+    x'' = (1 - t) / 2, so that x = -(t - 1)³ / 12 m."""
     times = np.linspace(0.0, 2.0, 9)
     motion = mbref.simulate(pushed(), "taylor", times=times)
     changes = [(event.contacts, event.released) for event in motion.events]
@@ -97,12 +101,13 @@ def test_contact_ends_when_its_force_would_pull():
     assert abs(motion.events[1].time - 1.0) <= ROUNDED
     free = np.maximum(times - 1.0, 0.0)
     assert np.abs(motion.position[:, 0, 0] + free**3 / 12).max() <= ROUNDED
-    assert np.abs(motion.joint("S").force[:, 0] + np.maximum(1.0 - times, 0.0)).max() <= 1e-10
+    assert np.abs(motion.joint("S").force[:, 0] + np.maximum(1.0 - times, 0.0)).max() <= SOLVED
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.3, 1.0])
-def test_two_masses_on_a_line_exchange_momentum(restitution):
-    """Their sum of m v is constant, and they part with e times the speed at which they met."""
+def test_two_masses_on_a_line_keep_their_momentum_and_part_by_the_restitution(restitution):
+    """2 kg at 3 m/s close a gap of 0.4 m to 1 kg at -1 m/s in 0.1 s. Their sum of m v is constant, and they
+    part with e times the speed at which they met, 4 m/s."""
     masses, speeds = np.array([2.0, 1.0]), np.array([3.0, -1.0])
     bodies = [
         body(n, m, [0.1] * 3, (k, 0.0, 0.0), velocity=[v, 0.0, 0.0])
@@ -117,17 +122,21 @@ def test_two_masses_on_a_line_exchange_momentum(restitution):
     assert abs(after[1] - after[0] - restitution * (speeds[0] - speeds[1])) <= 100 * ROUNDED
 
 
-RUNS = [(pushed(), natural_motion), pytest.param(door(), tree_motion, marks=pytest.mark.slow)]
-
-
-@pytest.mark.parametrize(("scene", "formulation"), RUNS, ids=["force A", "rod B"])
+@pytest.mark.parametrize(
+    ("scene", "formulation"),
+    [
+        pytest.param(pushed(), natural_motion, id="contact that ends, natural coordinates"),
+        pytest.param(door(), tree_motion, id="rod that rebounds, tree of joints", marks=pytest.mark.slow),
+    ],
+)
 def test_judge_finds_the_events_by_itself(scene, formulation):
-    """Formulations A and B locate gaps and forces from their own motions, without mbref's events."""
+    """The judge locates gaps and forces in its own motion, without mbref's events. Positions agree to
+    rounding, and velocities, which the impact changes, to ten times that."""
     times = np.linspace(0.0, scene.duration, 4)
     motion = mbref.simulate(scene, "taylor", times=times, rtol=1e-13)
     found = motion_by(formulation, scene, times, EXTENDED, seconds=60.0)
     assert not found.reason and np.abs(doubles(found.position) - motion.position).max() <= ROUNDED
-    assert np.abs(doubles(found.velocity) - motion.velocity).max() <= 1e-12
+    assert np.abs(doubles(found.velocity) - motion.velocity).max() <= 10 * ROUNDED
 
 
 @pytest.mark.parametrize(
@@ -140,11 +149,14 @@ def test_judge_finds_the_events_by_itself(scene, formulation):
     ],
 )
 def test_fault_of_a_stop_is_named(stop, says):
+    """A stop must have the start, 0 m, in its range, an end, a restitution of at most 1, and a length."""
     with pytest.raises(SceneError, match=says):
         ball(0.5, 1.0).with_(joint=[slide("S", "ground", "ball", ORIGIN, Z, stop=stop)])
 
 
 def test_stop_is_refused_at_a_driven_joint_in_a_diagnosis_and_by_an_engine_without_stops():
+    """The door has a stop at its hinge A. A driver would push through it, a diagnosis is of one pose, and the
+    adapter of MuJoCo maps no stops."""
     with pytest.raises(SceneError, match="needs a joint without a driver"):
         door().with_(driver=[{"joint": "A", "polynomial": [0.0, 1.0]}])
     with pytest.raises(SceneError, match=r"joint\[A\]\.stop: only motions have intervals and stops"):
@@ -161,16 +173,17 @@ def held_by_its_weight(duration: float, force: dict[str, Any]) -> Scene:
 
 
 def test_short_pull_lifts_a_mass_off_its_stop():
-    """50 N from 0.41 s to 0.42 s, a hundredth of the run: 49 · 0.01 m/s at 0.42 s, then 1 m/s² less."""
+    """50 N pull 1 kg of weight 1 N from 0.41 s to 0.42 s, an eightieth of the run: 49 · 0.01 m/s at 0.42 s,
+    from which the weight takes 0.38 m/s up to 0.8 s."""
     scene = held_by_its_weight(0.8, {"force": 50.0, "factor": {"start": 0.41, "stop": 0.42}})
     motion = mbref.simulate(scene, "taylor", times=[0.0, 0.8])
-    assert abs(motion.events[-1].time - 0.41) <= 1e-11
-    assert abs(motion.velocity[-1, 0, 2] - (0.49 - 0.38)) <= 1e-10
+    assert abs(motion.events[-1].time - 0.41) <= SOLVED
+    assert abs(motion.velocity[-1, 0, 2] - (0.49 - 0.38)) <= SOLVED
 
 
 @pytest.mark.parametrize("duration", [0.02, 0.2])
 def test_first_pull_of_a_fast_force_ends_the_contact_in_runs_of_any_length(duration):
-    """5 sin(80 π t) N exceeds the weight first at asin(1/5) / 80 π, about 0.8 ms."""
+    """5 sin(80 π t) N exceeds the weight, 1 N, first at asin(1/5) / 80 π, about 0.8 ms."""
     sine = {"polynomial": [0.0], "sine": {"amplitude": 1.0, "frequency": 80 * np.pi}}
     push = {"force": 5.0, "factor": sine}
     motion = mbref.simulate(held_by_its_weight(duration, push), times=[0.0, duration])
@@ -178,9 +191,10 @@ def test_first_pull_of_a_fast_force_ends_the_contact_in_runs_of_any_length(durat
 
 
 def test_rod_that_starts_at_the_end_of_its_range_leaves_it_without_an_event():
-    """Its upper end is its start, and it falls from there to -1 rad with I ω² / 2 = m g l sin 1."""
+    """Its upper end is its start, and it falls from there to -1 rad with I ω² / 2 = m g l sin 1, where I =
+    0.7 kg m², m = 2 kg and l = 0.5 m. With e = 0.5 it rebounds with ω / 2."""
     stop = {"lower": -1.0, "upper": 0.0, "restitution": 0.5}
     joint = hinge("A", "ground", "rod", ORIGIN, Z, stop=stop)
     (event,) = mbref.simulate(door().with_(joint=[joint]), "taylor", times=[0.0, 0.5]).events
     speed = np.sqrt(2 * 2.0 * G * 0.5 * np.sin(1.0) / 0.7)
-    assert event.stops == ("A.lower",) and abs(event.angular_velocity_after[0, 2] - speed / 2) <= 1e-10
+    assert event.stops == ("A.lower",) and abs(event.angular_velocity_after[0, 2] - speed / 2) <= SOLVED

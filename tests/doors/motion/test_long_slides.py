@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import mbref
-from mbref.scene import Body, Cylindrical, Driver, Revolute, Scene, Spherical
+from mbref.scene import Scene
+from tests.helpers.parts import Entry, X, hinge, joint
 from tests.helpers.power_balance import panel_times, unbalanced
 from tests.helpers.spinning import spinning_mechanism
 
@@ -12,41 +13,35 @@ SPEED, START, END = 10.0, 0.1, 0.7  # rad/s of the arm, m from its axis, s
 TIMES = np.linspace(0.0, END, 8)
 
 
-def beads(joints: list[Spherical | Cylindrical], length: float) -> Scene:
+def beads(joints: list[Entry], length: float) -> Scene:
     """Return two beads on an arm that turns at a constant speed; nothing holds them along the arm. They are
     at START · length from the axis at the start, and the joints connect them."""
-    place, velocity = (START * length, 0.0, 0.0), (0.0, SPEED * START * length, 0.0)
-    inertia = (0.1 * length**2,) * 3
-    turning = {"mass": 1.0, "inertia": inertia, "angular_velocity": (0.0, 0.0, SPEED)}
-    return Scene(
-        name="beads",
-        gravity=(0.0, 0.0, 0.0),
-        duration=END,
-        body=[
-            Body(name="arm", position=(0.0, 0.0, 0.0), **turning),
-            Body(name="bead", position=place, velocity=velocity, **turning),
-            Body(name="follower", position=place, velocity=velocity, **turning),
-        ],
-        joint=[
-            Revolute(name="A", bodies=("ground", "arm"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),
-            Cylindrical(name="S", bodies=("arm", "bead"), anchor=(0.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0)),
-            *joints,
-        ],
-        driver=[Driver(joint="A", polynomial=(0.0, SPEED))],
+    moving = {"position": (START * length, 0.0, 0.0), "velocity": (0.0, SPEED * START * length, 0.0)}
+    turning = {"mass": 1.0, "inertia": (0.1 * length**2,) * 3, "angular_velocity": (0.0, 0.0, SPEED)}
+    bodies = [{"name": "arm", "position": (0.0, 0.0, 0.0), **turning}]
+    bodies += [{"name": name, **moving, **turning} for name in ("bead", "follower")]
+    joints = [
+        hinge("A", "ground", "arm", (0, 0, 0)),
+        joint("S", "cylindrical", "arm", "bead", axis=X),
+        *joints,
+    ]
+    driver = [{"joint": "A", "polynomial": (0.0, SPEED)}]
+    return Scene(name="beads", duration=END, body=bodies, joint=joints, driver=driver).with_(
+        gravity=(0, 0, 0)
     )
 
 
 def open_tree(length: float) -> Scene:
     """Return beads without a closed loop: the follower slides on the other bead."""
-    bodies, anchor = ("bead", "follower"), (START * length, 0.0, 0.0)
-    return beads([Cylindrical(name="T", bodies=bodies, anchor=anchor, axis=(1.0, 0.0, 0.0))], length)
+    at = (START * length, 0.0, 0.0)
+    return beads([joint("T", "cylindrical", "bead", "follower", at, axis=X)], length)
 
 
 def closed_loop(length: float) -> Scene:
     """Return beads that two ball joints connect, which close a loop."""
-    bodies, distance = ("bead", "follower"), START * length
-    anchors = {"T": (distance, 0.0, 0.0), "U": (distance, 0.0, distance)}
-    return beads([Spherical(name=name, bodies=bodies, anchor=at) for name, at in anchors.items()], length)
+    r = START * length
+    anchors = {"T": (r, 0.0, 0.0), "U": (r, 0.0, r)}
+    return beads([joint(k, "spherical", "bead", "follower", at) for k, at in anchors.items()], length)
 
 
 @pytest.mark.parametrize("length", [1e-6, 1.0, 1e6])

@@ -92,7 +92,7 @@ def test_matrices_along_a_motion_have_its_energy_reactions_and_labels():
     assert T.lam[rows] == pytest.approx(motion.joint("B").force[0], rel=1e-9)
     b = T.columns.index("rod x")
     assert T.v[b : b + 3] == pytest.approx(motion["rod"].velocity[0], rel=1e-12)
-    assert T.rank == len(T.rows) == len(set(T.rows)) and T.q_rate.shape == T.q.shape
+    assert T.rank == len(T.rows) == len(set(T.rows)), "rows are independent and have labels of their own"
 
 
 def pseudo_inverse(T):
@@ -112,8 +112,8 @@ def augmented(T):
 
 @pytest.mark.parametrize(("formulation", "chart"), [(pseudo_inverse, "projection"), (augmented, "none")])
 def test_own_formulation_turns_a_gear_pair_by_its_closed_form(formulation, chart):
-    """M t² / 2 J with J = J_A + r² J_B, over several full turns; -½ of it the other wheel. The bearings carry
-    the tooth torques r α J_B and α J_A - M. The run's own error estimate is below CLOSE, too."""
+    """M t² / 2 J with J = J_A + r² J_B, over several full turns; r = -½ of it the other wheel. M = 2 N m, J_A
+    = 0.03 and J_B = 0.2 kg m². The bearings carry the tooth torques r α J_B and α J_A - M, α = M / J."""
     times = np.linspace(0.0, 1.0, 5)
     motion = mbref.simulate(
         gear_pair(), times=times, rtol=1e-10, formulation=formulation, stabilisation=chart
@@ -125,7 +125,6 @@ def test_own_formulation_turns_a_gear_pair_by_its_closed_form(formulation, chart
     assert motion.joint("B").angle == pytest.approx(-0.5 * rate * times**2 / 2, abs=CLOSE)
     assert motion.joint("A").moment[:, 2] == pytest.approx(rate * 0.03 - 2.0, rel=CLOSE)
     assert motion.joint("B").moment[:, 2] == pytest.approx(-0.5 * rate * 0.2, rel=CLOSE)
-    assert np.nanmax(mbref.with_error_estimate(motion).error_estimate.error) < CLOSE
 
 
 def test_projection_holds_the_joints_of_an_own_formulation_to_rounding():
@@ -166,6 +165,7 @@ def test_own_stabilisation_replaces_the_state_after_each_step():
     ids=["no inverse", "not a number", "leaves the constraints"],
 )
 def test_own_formulation_that_fails_ends_the_run_with_the_outcome_of_its_failure(formulation, outcome, says):
+    """It inverts a matrix of zeros, returns NaN, or accelerations that part the pendulum from its joint."""
     ended = mbref.simulate("point_pendulum", formulation=formulation)
     assert ended.outcome.name == outcome and says in ended.message
 
@@ -181,6 +181,7 @@ def test_own_formulation_that_fails_ends_the_run_with_the_outcome_of_its_failure
     ids=["q for its acceleration", "method and formulation", "gains of another method", "projection alone"],
 )
 def test_own_functions_of_wrong_shape_or_wrong_combination_are_refused(faulty, says):
+    """The pendulum has one body: q̈ has six numbers, q seven."""
     with pytest.raises(mbref.InputError, match=says):
         mbref.simulate("point_pendulum", **faulty)
 

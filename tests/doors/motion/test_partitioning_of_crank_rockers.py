@@ -9,7 +9,7 @@ import pytest
 import mbref
 from crosscheck.judge.truth import closed_form, truth_for
 from mbref.scene import Scene
-from tests.helpers.parts import hinge
+from tests.helpers.parts import Z, hinge, rod, turning_about
 from tests.helpers.spinning import spinning_mechanism
 
 RATE, END = 7.0, 0.45  # rad/s of the crank at the start, and s
@@ -31,41 +31,16 @@ def pin(lengths: tuple[float, ...], angle: np.ndarray, side: float) -> tuple[np.
     return b, b + along * unit + side * height * np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
 
 
-def turning_rates(lengths: tuple[float, ...], angle: float, side: float) -> tuple[float, ...]:
-    """Return the rates of crank, coupler and rocker, rad/s, by central differences of their directions."""
-    step = 1e-5
-
-    def directions(at: float) -> np.ndarray:
-        b, c = pin(lengths, np.array(at), side)
-        ends = (b, c - b, c - np.array([lengths[3], 0.0]))
-        return np.array([math.atan2(y, x) for x, y in ends])
-
-    changes = directions(angle + step) - directions(angle - step)
-    return tuple((np.mod(changes + np.pi, 2 * np.pi) - np.pi) / (2 * step) * RATE)
-
-
 def crank_rocker(lengths: tuple[float, ...], angle: float) -> Scene:
-    """Return a four-bar of thin rods that moves freely, with the crank at an angle, rad."""
-    b, c = pin(lengths, np.array(angle), 1.0)
-    a, d = np.zeros(2), np.array([lengths[3], 0.0])
-    rates, bodies = turning_rates(lengths, angle, 1.0), []
-    starts = (0.0 * b, RATE * np.array([-b[1], b[0]]), 0.0 * b)
-    for name, (p, q), rate, start in zip("abc", ((a, b), (b, c), (d, c)), rates, starts, strict=True):
-        turn, size = math.atan2(*(q - p)[::-1]) / 2, float(np.linalg.norm(q - p))
-        arm = (q - p) / 2
-        bodies.append(
-            {
-                "name": name,
-                "mass": size,
-                "inertia": [1e-4 * size, size**3 / 12, size**3 / 12 + 1e-5 * size],
-                "position": [*(p + arm), 0.0],
-                "orientation": [math.cos(turn), 0.0, 0.0, math.sin(turn)],
-                "velocity": [*(start + rate * np.array([-arm[1], arm[0]])), 0.0],
-                "angular_velocity": [0.0, 0.0, rate],
-            }
-        )
-    hinges = (("A", "ground", "a", a), ("B", "a", "b", b), ("C", "b", "c", c), ("D", "ground", "c", d))
-    joints = [hinge(*names, (*place, 0.0)) for *names, place in hinges]
+    """Return a four-bar of rods, 1 kg/m, that moves freely, with the crank at an angle, rad. The velocities
+    of coupler and rocker follow from the crank's."""
+    a, d = (0.0, 0.0, 0.0), (lengths[3], 0.0, 0.0)
+    b, c = ((*place, 0.0) for place in pin(lengths, np.array(angle), 1.0))
+    ends, names = ((a, b), (b, c), (d, c)), ("crank", "coupler", "rocker")
+    bodies = [rod(name, p, q, math.dist(p, q)) for name, (p, q) in zip(names, ends, strict=True)]
+    bodies[0] = turning_about(a, Z, RATE, bodies[0])
+    pairs = (("ground", "crank"), ("crank", "coupler"), ("coupler", "rocker"), ("ground", "rocker"))
+    joints = [hinge(n, *pair, at) for n, pair, at in zip("ABCD", pairs, (a, b, c, d), strict=True)]
     return Scene(name="crank_rocker", gravity=[0.0, 0.0, 0.0], duration=1.0, body=bodies, joint=joints)
 
 

@@ -47,10 +47,8 @@ def test_mass_under_a_periodic_force_moves_as_both_formulations_of_the_reference
     exact = whole(SAMPLES) - whole(0.0) - whole(0.0, 1) * SAMPLES
     moved = mbref.simulate(mbref.Scene.from_file(tmp_path / "slide.toml"), times=SAMPLES, rtol=1e-12)
     assert moved.joint("J").displacement == pytest.approx(exact, abs=1e-11)
-    for found in (
-        natural_motion(scene, SAMPLES, EXTENDED),
-        tree_motion(scene, SAMPLES, EXTENDED, seconds=100.0),
-    ):
+    for reference in (natural_motion, tree_motion):
+        found = reference(scene, SAMPLES, EXTENDED, seconds=100.0)
         moved = (doubles(found.position[:, 0]) - scene.body[0].position) @ AXIS
         assert not found.reason and np.abs(moved - exact).max() < 1e-13
 

@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 
 from mbref import Limits, rotations, simulate
-from mbref.scene import Body, Fixed, Force, Revolute, Scene, Spherical
+from mbref.scene import Force, Scene
 from mbref.scenes import find_scene
 from mbref.scenes.planar_slider_crank import slider_crank
+from tests.helpers.changed_scenes import in_another_frame
+from tests.helpers.coupled_mechanisms import body
 from tests.helpers.newton_euler import unbalanced
+from tests.helpers.parts import hinge, joint
 
 METHOD = "alf-dual+projection"
 UNBALANCED = 1e-8  # N or N m left of the balance of a body, over the largest: 100 tolerances of the run
@@ -27,40 +30,11 @@ def flattened(scene: Scene) -> Scene:
     return scene.with_(body=bodies, joint=joints)
 
 
-def turned(scene: Scene, about: tuple[float, float, float]) -> Scene:
-    """The whole scene after a rotation vector (rad)."""
-    q = rotations.from_vector(np.array(about))
-
-    def vector(v):
-        return tuple(map(float, rotations.rotate(q, np.array(v, dtype=float))))
-
-    bodies = [
-        body.model_copy(
-            update={
-                "position": vector(body.position),
-                "orientation": tuple(map(float, rotations.multiply(q, np.array(body.orientation)))),
-                "angular_velocity": None if body.angular_velocity is None else vector(body.angular_velocity),
-            }
-        )
-        for body in scene.body
-    ]
-    joints = [
-        joint.model_copy(update={"anchor": vector(joint.anchor), "axis": vector(joint.axis)})
-        for joint in scene.joint
-    ]
-    return scene.with_(body=tuple(bodies), joint=tuple(joints), gravity=vector(scene.gravity))
-
-
 def doubled(loops: int, apart: float) -> Scene:
     """A chain of four-bars, each joint two hinges at this distance (m)."""
-    scene = find_scene(f"four_bar_chain[{loops}]")
-    joints = tuple(
-        Revolute(
-            name=f"{joint.name}{side}", bodies=joint.bodies, anchor=(*joint.anchor[:2], z), axis=(0, 0, 1)
-        )
-        for joint in scene.joint
-        for side, z in (("l", -apart / 2), ("r", apart / 2))
-    )
+    scene, sides = find_scene(f"four_bar_chain[{loops}]"), {"l": -apart / 2, "r": apart / 2}
+    pairs = [(each, side) for each in scene.joint for side in sides]
+    joints = [hinge(f"{j.name}{side}", *j.bodies, (*j.anchor[:2], sides[side])) for j, side in pairs]
     return scene.with_(joint=joints)
 
 
@@ -91,11 +65,12 @@ def test_motion_turns_with_the_planes_of_a_mechanism(about):
     """Positions and accelerations turn by the rotation vector (rad), to 100 tolerances of the run, 1e-10;
     reactions balance every body."""
     scene = find_scene("strandbeest[2]")
-    here, there = run_of(scene), run_of(turned(scene, about))
     q = rotations.from_vector(np.array(about))
+    turned = in_another_frame(scene, q, np.zeros(3))
+    here, there = run_of(scene), run_of(turned)
     for values, theirs in ((here.position, there.position), (here.acceleration, there.acceleration)):
         assert rotations.rotate(q, values) == pytest.approx(theirs, abs=1e-8 * np.abs(values).max())
-    assert max(unbalanced(turned(scene, about), there)) < UNBALANCED
+    assert max(unbalanced(turned, there)) < UNBALANCED
 
 
 def test_two_hinges_in_place_of_one_carry_half_its_force_each():
@@ -104,9 +79,9 @@ def test_two_hinges_in_place_of_one_carry_half_its_force_each():
     one, two = run_of(single), run_of(pairs)
     assert two.position == pytest.approx(one.position, abs=1e-11)  # m
     assert max(unbalanced(pairs, two)) < UNBALANCED
-    for joint in single.joint:
-        left, right = (two.reactions[f"{joint.name}{side}"][:, :3] for side in "lr")
-        force = one.reactions[joint.name][:, :3]
+    for name, wrench in one.reactions.items():
+        left, right = (two.reactions[f"{name}{side}"][:, :3] for side in "lr")
+        force = wrench[:, :3]
         assert left + right == pytest.approx(force, abs=1e-6)  # N
         # the share of redundant rows is determined up to the rounding unit times the penalty, 1e10
         assert left == pytest.approx(right, abs=1e-5 * np.abs(force).max())
@@ -116,14 +91,8 @@ def test_two_hinges_in_place_of_one_carry_half_its_force_each():
 def test_links_on_a_ball_joint_leave_their_planes_where_a_force_pushes(method):
     """A ball joint at the ground carries two links, which a hinge connects. A force of 3 N on one of them,
     normal to their planes, swings both out: by 0.1 mm or more in 0.05 s."""
-    bodies = tuple(
-        Body(name=name, mass=1.0, inertia=(0.01, 0.1, 0.1), position=(0.5, 0.0, z))
-        for name, z in (("lower", 0.0), ("upper", 0.1))
-    )
-    joints = (
-        Spherical(name="A", bodies=("ground", "lower"), anchor=(0.0, 0.0, 0.0)),
-        Revolute(name="B", bodies=("lower", "upper"), anchor=(1.0, 0.0, 0.05), axis=(0.0, 0.0, 1.0)),
-    )
+    bodies = [body(n, 1.0, [0.01, 0.1, 0.1], (0.5, 0.0, z)) for n, z in (("lower", 0.0), ("upper", 0.1))]
+    joints = [joint("A", "spherical", "ground", "lower"), hinge("B", "lower", "upper", (1.0, 0.0, 0.05))]
     force = Force(body="upper", point=(0.5, 0.0, 0.1), force=(0.0, 0.0, 3.0))
     pushed = Scene(name="loose", gravity=(0.0, -9.81, 0.0), body=bodies, joint=joints, load=[force])
     out = run_of(pushed, method).position[-1, :, 2] - [0.0, 0.1]
@@ -132,21 +101,15 @@ def test_links_on_a_ball_joint_leave_their_planes_where_a_force_pushes(method):
 
 def crankshaft(singular: int, count: int) -> Scene:
     """Slider-cranks on one shaft, of which one has a rod as long as its crank."""
-    cylinders = [
-        slider_crank(0.304, 0.304 if i == singular else 0.4048, 0.3 + 2.0 * i, "c", 30.0, str(i), 0.1 * i)
-        for i in range(count)
-    ]
-    shaft = tuple(
-        Fixed(name=f"E{i}", bodies=(f"crank{i}", f"crank{i + 1}"), anchor=(0.0, 0.0, 0.1 * i))
-        for i in range(count - 1)
-    )
-    return Scene(
-        name="crankshaft",
-        gravity=(0.0, -9.81, 0.0),
-        duration=0.1,
-        body=tuple(body for cylinder in cylinders for body in cylinder.body),
-        joint=tuple(joint for cylinder in cylinders for joint in cylinder.joint) + shaft,
-    )
+    bodies, joints = [], []
+    for i in range(count):
+        rod = 0.304 if i == singular else 0.4048
+        cylinder = slider_crank(0.304, rod, 0.3 + 2.0 * i, "c", 30.0, str(i), 0.1 * i)
+        bodies += cylinder.body
+        joints += cylinder.joint
+        if i:
+            joints.append(joint(f"E{i}", "fixed", f"crank{i - 1}", f"crank{i}", (0.0, 0.0, 0.1 * i - 0.1)))
+    return Scene(name="crankshaft", gravity=(0.0, -9.81, 0.0), duration=0.1, body=bodies, joint=joints)
 
 
 @pytest.mark.parametrize("singular", [0, 3])

@@ -47,9 +47,8 @@ def test_changed_copy_moves_by_its_own_numbers(copy):
     changed = scene.with_(**change) if copy == "with_" else scene.model_copy(update=change)
     found = simulate(changed, times=TIMES).position
     assert np.abs(found - before)[-1].max() > 1e-6  # m
-    assert np.array_equal(
-        found, simulate(find_scene(scene.name).with_(name="copy", **change), times=TIMES).position
-    )
+    fresh = find_scene(scene.name).with_(name="copy", **change)
+    assert np.array_equal(found, simulate(fresh, times=TIMES).position)
 
 
 def test_scene_has_no_negative_zero():

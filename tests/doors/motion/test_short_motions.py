@@ -1,5 +1,7 @@
 """Short motions of every joint, load, driver and coupling: `taylor` has the judge's stored states."""
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -19,12 +21,18 @@ def tolerance(steps: int) -> float:
     return 20 * ROUNDING * (20 + steps)
 
 
+@functools.cache
+def run_of(name: str) -> mbref.Motion:
+    """Return a motion at its stored times, computed once for the tests of this file in a process."""
+    scene = MOTIONS[name]()
+    return mbref.simulate(scene, "taylor", times=times_of(scene), rtol=1e-12)
+
+
 @pytest.mark.parametrize("name", MOTIONS)
 def test_motion_has_the_judges_states_to_rounding(name):
     """The stored states are by the judge's references or closed forms. Runs cross as many singular positions
     as `CROSSED` says; there rounding is magnified by up to 100."""
-    scene = MOTIONS[name]()
-    found = mbref.simulate(scene, "taylor", times=times_of(scene), rtol=1e-12)
+    found = run_of(name)
     assert found.outcome.name == "COMPLETED", found.message
     _, crossings = CROSSED.get(name, (0, None))
     sharp = 1.0 if crossings is None else 100.0  # a singular position magnifies rounding
@@ -44,10 +52,8 @@ def test_accelerations_are_the_rates_of_velocities(name):
     scene = MOTIONS[name]()
     middle, apart = 0.43 * scene.duration, 1e-4 * scene.duration
     run = mbref.simulate(scene, "taylor", times=[middle - apart, middle, middle + apart], rtol=1e-12)
-    for rate, acceleration in (
-        (run.velocity, run.acceleration),
-        (run.angular_velocity, run.angular_acceleration),
-    ):
+    spins = run.angular_velocity, run.angular_acceleration
+    for rate, acceleration in ((run.velocity, run.acceleration), spins):
         slope = (rate[2] - rate[0]) / (2 * apart)
         assert acceleration is not None
         curvature = np.abs(acceleration[2] - acceleration[0]).max()
@@ -66,13 +72,11 @@ BARE = [
 def test_reactions_and_gravity_obey_newtons_and_eulers_equations_of_every_body(name):
     """m a = m g + Σ F and J ω' + ω × J ω = Σ M, for mechanisms without loads, couplings and armatures. The
     rest is relative to the largest force or moment: a thousand times the tolerance."""
-    scene = MOTIONS[name]()
-    run = mbref.simulate(scene, "taylor", times=times_of(scene), rtol=1e-12)
-    force, moment = unbalanced(scene, run)
+    force, moment = unbalanced(MOTIONS[name](), run_of(name))
     assert max(force, moment) < 1e-9
 
 
 def test_all_short_motions_together_take_at_most_1050_steps():
     """The series are long: 970 steps were taken once, of all motions, at a tolerance of 1e-12."""
-    runs = [mbref.simulate(s := make(), "taylor", times=times_of(s), rtol=1e-12) for make in MOTIONS.values()]
+    runs = [run_of(name) for name in MOTIONS]
     assert {run.outcome.name for run in runs} == {"COMPLETED"} and sum(run.cost.steps for run in runs) < STEPS

@@ -20,9 +20,7 @@ METHODS = (
     *(f"alf-dual+{name}/rk4[step=0.01]" for name in STABILISATIONS),
 )
 STEPS = 1e-12  # m: a few thousand roundings of a fall of a metre, in a run of exact series
-FIXED = (
-    10 * STEPS
-)  # m: fixed steps and iterations of other methods, which are exact for falls, round more often
+FIXED = 10 * STEPS  # m: fixed steps and iterations, which are exact for falls, round more often
 
 
 def slide(gravity=GRAVITIES[2], axis=AXES[2], **changes) -> Scene:
