@@ -11,10 +11,13 @@ import crosscheck
 from crosscheck.cli import main
 from crosscheck.cli.comparison import Comparison
 from crosscheck.cli.request import RequestError
-from crosscheck.engine import Setting
+from crosscheck.engine import Setting, engine
 from crosscheck.study.grid import Case, key, study
 from crosscheck.study.search.execution import Chains
+from crosscheck.study.search.offers import default_cases
+from crosscheck.study.search.selection import of_few_families
 from mbref.scene import Body, Scene
+from mbref.scenes import SCENES
 from tests.helpers.fake_engines import FAKES
 
 FAKE = f"{FAKES}:FAKE"
@@ -71,9 +74,9 @@ def test_runs_of_one_engine_follow_each_other_and_do_not_wait_for_their_measurem
     """Two engines with three runs each of 20 ms or more, so that runs that overlap are seen; ``measure``
     returns only after all six runs have ended."""
     cases = [
-        Case(BLOCK, np.array([0.0, 1.0]), engine, Setting("f", {"k": k}))
+        Case(BLOCK, np.array([0.0, 1.0]), name, Setting("f", {"k": k}))
         for k in range(3)
-        for engine in ("first", "second")
+        for name in ("first", "second")
     ]
     going, order, all_run = set(), [], threading.Event()
 
@@ -94,8 +97,8 @@ def test_runs_of_one_engine_follow_each_other_and_do_not_wait_for_their_measurem
     with Chains(measure) as threads:
         found = study(cases, threads, run=run)
     assert [r["key"] for r in found] == [key(c) for c in cases]
-    for engine in ("first", "second"):
-        assert [k for name, k in order if name == engine] == [0, 1, 2]
+    for name in ("first", "second"):
+        assert [k for ran, k in order if ran == name] == [0, 1, 2]
 
 
 def test_an_exception_in_a_run_is_raised_by_the_study():
@@ -116,3 +119,11 @@ def test_compare_takes_one_engine_and_one_family_without_a_list():
 def test_a_comparison_is_saved_as_json_only(compared, tmp_path):
     with pytest.raises(ValueError, match=r"a.mp4: a comparison is saved as .json"):
         compared.save(tmp_path / "a.mp4")
+
+
+def test_a_quick_comparison_runs_mbref_at_its_default_method():
+    """The Taylor series is the default of small mechanisms. It is among the few families of quick depth, and
+    is the first of the engine's best settings."""
+    scene = SCENES["four_bar_gravity"]()
+    families = {case.setting.family for case in of_few_families(default_cases(scene, ["mbref"])[0])}
+    assert "taylor" in families and engine("mbref").best_settings(scene)[0].family == "taylor"

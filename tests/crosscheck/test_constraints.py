@@ -59,15 +59,20 @@ class Consistent:
         phi, _, bias = c.levels(self.t, self.frames)
         return phi, c.jacobian(self.t, self.frames) @ self.to_body, -bias
 
-    def mbref(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same of mbref's model, whose bodies have principal frames."""
+    def terms_of_mbref(self):
+        """Terms of mbref's model, whose bodies have principal frames, and the matrix (6 nb, 6 nb) from world
+        twists to twists in these frames."""
         model = Model(self.scene)
         start = np.array([body.orientation for body in self.scene.body])
         principal = rotations.multiply(rotations.conjugate(start), model.orientation)
         p = rotations.multiply(self.p, principal)
         spin = rotations.rotate(rotations.conjugate(p), self.w)
         terms = model.terms(self.t, np.hstack([self.r, p]).ravel(), np.hstack([self.v, spin]).ravel())
-        back = block_diag(*(block_diag(np.eye(3), a.T) for a in rotations.to_matrix(p)))
+        return terms, block_diag(*(block_diag(np.eye(3), a.T) for a in rotations.to_matrix(p)))
+
+    def mbref(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The same of mbref's model."""
+        terms, back = self.terms_of_mbref()
         return terms.phi, terms.jacobian @ back, terms.gamma
 
     def poses(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -171,11 +176,6 @@ def test_generalised_forces_of_adapters_equal_mbrefs(name: str) -> None:
     forces = Forces(scene)
     angles = np.array([forces.angle(s.frames, k) for k in range(len(forces.twists))])
     ours = s.to_body.T @ forces(s.frames, s.omega, angles)
-    model = Model(scene)
-    start = np.array([body.orientation for body in scene.body])
-    p = rotations.multiply(s.p, rotations.multiply(rotations.conjugate(start), model.orientation))
-    spin = rotations.rotate(rotations.conjugate(p), s.w)
-    terms = model.terms(0.0, np.hstack([s.r, p]).ravel(), np.hstack([s.v, spin]).ravel())
-    back = block_diag(*(block_diag(np.eye(3), a.T) for a in rotations.to_matrix(p)))
+    terms, back = s.terms_of_mbref()
     theirs = back.T @ terms.force
     assert abs(ours - theirs).max() / abs(theirs).max() < MARGIN * ROUNDING

@@ -118,10 +118,8 @@ def test_a_file_in_the_cache_is_found_by_its_origin_unless_it_is_damaged(tmp_pat
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert file_cache.stored("folder", "origin", ".txt") is None
     path = file_cache.store("folder", "origin", ".txt", lambda target: target.write_text("whole"))
-    assert (
-        file_cache.stored("folder", "origin", ".txt") == path
-        and file_cache.stored("folder", "other", ".txt") is None
-    )
+    assert file_cache.stored("folder", "origin", ".txt") == path
+    assert file_cache.stored("folder", "other", ".txt") is None
     path.write_text("damaged")
     assert file_cache.stored("folder", "origin", ".txt") is None
 
@@ -131,16 +129,9 @@ def test_a_compiled_library_in_the_cache_is_used_by_another_process(tmp_path, mo
     needs("casadi")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("LD_LIBRARY_PATH", raising=False)  # where OpenSim, once imported, has another CasADi
-    code = (
-        "from crosscheck.engines.casadi import library; from mbref.scenes import SCENES; "
-        "library.library(SCENES['planar_slider_crank_gravity'](), 0.0); "
-        "import sys; print('casadi' in sys.modules)"
-    )
-    imported = [
-        subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, check=True
-        ).stdout.strip()
-        for _ in range(2)
-    ]
-    assert imported == ["True", "False"]
+    code = "import sys; from crosscheck.engines.casadi import library; from mbref.scenes import SCENES\n"
+    code += "library.library(SCENES['planar_slider_crank_gravity'](), 0.0); print('casadi' in sys.modules)"
+    command = [sys.executable, "-c", code]
+    imported = [subprocess.run(command, capture_output=True, check=True).stdout for _ in range(2)]
+    assert imported == [b"True\n", b"False\n"]
     assert len(list((tmp_path / "mbref" / "casadi").iterdir())) == 1

@@ -10,6 +10,7 @@ from crosscheck.conformance.mechanisms.closed_forms import screw
 from crosscheck.conformance.mechanisms.features import feature_scenes
 from crosscheck.engine import Owner, Setting, engine
 from crosscheck.engines.mujoco.ports import OWN_STEPS
+from crosscheck.engines.warp.adapter import ENGINE
 from crosscheck.findings.finding import FOLDER
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.metrics import error_series
@@ -138,3 +139,17 @@ def test_port_moves_loads_couplings_and_armatures_as_the_reference(name: str) ->
     )
     for body, wrong, by_parts in zip(scene.body, off, effect, strict=True):
         assert wrong < PART * by_parts, f"{body.name}: {wrong:.1e} of {by_parts:.1e}"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", ["stock", "euler", "defaults"])
+def test_recorded_graph_of_mujoco_warp_moves_as_its_single_steps(family: str) -> None:
+    """20 steps of 1 ms by the adapter's graph and the library's own step function: equal to the last bit."""
+    warp = pytest.importorskip("mujoco_warp")
+    scene = DIFFICULTIES[0].make()
+    recorded, plain = (ENGINE.world(scene, Setting(family, {"step": 1e-3})) for _ in range(2))
+    recorded.step(0.0, 1e-3, 20)
+    plain.model.opt.timestep.fill_(1e-3)
+    for _ in range(20):
+        warp.step(plain.model, plain.data)
+    assert np.array_equal(recorded.motion().position, plain.motion().position)

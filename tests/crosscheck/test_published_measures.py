@@ -21,45 +21,64 @@ TIMES = np.array([0.0, 0.5, 1.0])
 
 
 def at_rest(k: int = 3) -> Trajectory:
+    """Return k samples, 0.5 s apart, of "arm" at (1, 0, 0) m and "far" at (3, 4, 0) m."""
     still = np.zeros((k, 2, 3))
     places = np.tile([ARM.position, FAR.position], (k, 1, 1))
     turns = np.tile([1.0, 0.0, 0.0, 0.0], (k, 2, 1))
     return Trajectory("two", "e", "1", "m", {}, TIMES[:k], ("arm", "far"), places, turns, still, still.copy())
 
 
-def moved(sample: int, body: int, by: tuple[float, float, float], k: int = 3) -> Trajectory:
-    run = at_rest(k)
+def moved(sample: int, body: int, by: tuple[float, float, float]) -> Trajectory:
+    run = at_rest()
     run.position[sample, body] += by
     return run
 
 
 def test_energy_measure_is_the_largest_change_in_joule():
-    """2 kg at 3 m/s have 9 J; 3 kg higher by 0.1 m, at g = 10 m/s², have 3 J; at rest nothing changes."""
+    """2 kg at 3 m/s have 9 J; 3 kg higher by 0.1 m, at g = 10 m/s², have 3 J."""
     fast = at_rest()
     fast.velocity[2, 0] = (0.0, 3.0, 0.0)
     assert measures.energy(SCENE, fast, None) == pytest.approx(9.0)
     assert measures.energy(SCENE, moved(1, 1, (0.0, 0.0, 0.1)), None) == pytest.approx(3.0)
-    assert measures.energy(SCENE, at_rest(), None) == 0.0
 
 
 def test_distance_measures_compare_a_centre_with_the_truth():
     """Body "far" is 5 m from the origin, and off by 0.5 m at one of three samples: largest distance 0.5 m,
-    over 5 m 0.1, and root mean square 0.5 m / √3. A truth that ends earlier judges only its own samples;
-    without a truth or samples there is no measure (None)."""
+    over 5 m 0.1, and root mean square 0.5 m / √3."""
     off, true = moved(1, 1, (0.3, 0.0, 0.4)), at_rest()
     assert measures.distance("far")(SCENE, off, true) == pytest.approx(0.5)
     assert measures.distance("arm")(SCENE, off, true) == 0.0
     assert measures.relative_distance("far")(SCENE, off, true) == pytest.approx(0.1)
     assert measures.mean_square_distance("far")(SCENE, off, true) == pytest.approx(0.5 / np.sqrt(3))
-    for measure in (measures.distance, measures.relative_distance, measures.mean_square_distance):
-        assert measure("far")(SCENE, off, None) is None
-        assert measure("far")(SCENE, moved(2, 1, (9.0, 0.0, 0.0)), at_rest(2)) == 0.0
-    assert measures.mean_square_distance("far")(SCENE, at_rest(0), at_rest(0)) is None
+
+
+def end(scene: Scene, motion: Trajectory) -> dict[str, float]:
+    """Return x of the arm and y of "far" (m) at the last sample."""
+    return {"x": float(motion.position[-1, 0, 0]), "y": float(motion.position[-1, 1, 1])}
+
+
+OF_ALL = (measures.distance("far"), measures.relative_distance("far"), measures.mean_square_distance("far"))
+OF_ALL += (measures.relative_to_each(lambda motion: motion.position[:, :, 0]),)
+AT_THE_END = measures.relative_at_the_end(end, ("x", "y"))
+
+
+def test_truth_that_ends_earlier_judges_only_its_own_samples():
+    """The third sample is off by 9 m, and the truth has two samples. A measure of the end is unknown
+    (None)."""
+    for measure in OF_ALL:
+        assert measure(SCENE, moved(2, 1, (9.0, 0.0, 0.0)), at_rest(2)) == 0.0
+    assert AT_THE_END(SCENE, at_rest(), at_rest(2)) is None
+
+
+@pytest.mark.parametrize("measure", (*OF_ALL, AT_THE_END), ids=["distance", "relative", "rms", "each", "end"])
+def test_without_a_truth_there_is_no_measure(measure):
+    """None stands for no measure; with a truth the motion at rest has one."""
+    assert measure(SCENE, at_rest(), at_rest()) == 0.0
+    assert measure(SCENE, at_rest(), None) is None
 
 
 def test_relative_measure_is_the_largest_over_all_observed_numbers():
-    """2 m is off by 0.02 m: 0.01. 1e-5 m is off by 3e-5 m: 0.03, over the least denominator 1e-3 m. Samples
-    that the truth lacks do not count."""
+    """2 m is off by 0.02 m: 0.01. 1e-5 m is off by 3e-5 m: 0.03, over the least denominator 1e-3 m."""
 
     def first(motion: Trajectory) -> np.ndarray:
         return motion.position[:, :, 0]
@@ -68,31 +87,22 @@ def test_relative_measure_is_the_largest_over_all_observed_numbers():
     true.position[:, 0, 0], true.position[:, 1, 0] = 2.0, 1e-5
     run = replace(true, position=true.position.copy())
     run.position[1, 0, 0] += 0.02
-    assert measure(SCENE, run, true) == pytest.approx(0.01) and measure(SCENE, run, None) is None
+    assert measure(SCENE, run, true) == pytest.approx(0.01)
     run.position[2, 1, 0] -= 3e-5
     assert measure(SCENE, run, true) == pytest.approx(0.03)
-    assert measure(SCENE, run, at_rest(0)) == 0.0
 
 
 def test_end_measure_is_the_largest_relative_error_of_the_last_sample():
-    """x is off by 0.25 of 1 m and y by 2 of 4 m at the end, or x by 1.75 of -1 m; earlier samples do not
-    count. Without a truth at the end there is no measure (None)."""
-
-    def seen(scene: Scene, motion: Trajectory) -> dict[str, float]:
-        return {"x": float(motion.position[-1, 0, 0]), "y": float(motion.position[-1, 1, 1]), "z": 1.0}
-
-    measure = measures.relative_at_the_end(seen, ("x", "y"))
+    """x is off by 0.25 of 1 m and y by 2 of 4 m at the end, or x by 1.75 of -1 m; earlier samples, off by 100
+    m, do not count."""
     run = moved(2, 0, (-0.25, 0.0, 0.0))
     run.position[2, 1, 1] += 2.0
     run.position[1] += 100.0
-    assert measure(SCENE, run, at_rest()) == pytest.approx(0.5)
-    assert measures.relative_at_the_end(seen, ("x",))(SCENE, run, at_rest()) == pytest.approx(0.25)
+    assert AT_THE_END(SCENE, run, at_rest()) == pytest.approx(0.5)
+    assert measures.relative_at_the_end(end, ("x",))(SCENE, run, at_rest()) == pytest.approx(0.25)
     negative = at_rest()
     negative.position[2, 0, 0] = -1.0
-    assert measures.relative_at_the_end(seen, ("x",))(SCENE, run, negative) == pytest.approx(1.75)
-    assert measure(SCENE, run, None) is None
-    assert measure(SCENE, run, at_rest(2)) is None
-    assert measure(SCENE, at_rest(0), at_rest(0)) is None
+    assert measures.relative_at_the_end(end, ("x",))(SCENE, run, negative) == pytest.approx(1.75)
 
 
 def turning(angles: tuple[tuple[float, float], ...]) -> Trajectory:

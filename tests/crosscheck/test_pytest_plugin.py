@@ -20,27 +20,13 @@ def held(
 ) -> subprocess.CompletedProcess[str]:
     """pytest on the suite in an empty directory, the example engine in this place."""
     plugin = ["-p", "crosscheck.conformance.pytest_plugin", "-p", "cacheprovider", "-o", "addopts="]
-    named = [
-        "--pyargs",
-        "crosscheck.conformance",
-        "--engine",
-        name,
-        *([] if path else ["--in-process"]),
-        "-k",
-        chosen,
-    ]
+    named = ["--pyargs", "crosscheck.conformance", "--engine", name, "-k", chosen]
+    named += [] if path else ["--in-process"]
+    command = [sys.executable, "-m", "pytest", "-q", *plugin, "--rootdir", place, *named, *options]
+    found = {"PYTHONPATH": path or f"{place}{os.pathsep}{ROOT}", "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    env, limit = {**os.environ, **found}, 300  # s
     return subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", *plugin, "--rootdir", place, *named, *options],
-        cwd=place,
-        env={
-            **os.environ,
-            "PYTHONPATH": path or f"{place}{os.pathsep}{ROOT}",
-            "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
-        },
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
+        command, cwd=place, env=env, capture_output=True, text=True, timeout=limit, check=False
     )
 
 

@@ -6,14 +6,14 @@ import pytest
 from crosscheck.engine import engine
 from crosscheck.judge.constraints import initial_poses
 from crosscheck.judge.gauss_motion import gauss_motion
-from crosscheck.judge.joint_reactions import compare, shared_wrenches
+from crosscheck.judge.joint_reactions import compare, shared_wrenches, side_by_side
 from crosscheck.judge.reaction_balance import with_exact_reactions
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Body, Revolute, Scene, Spherical
 from mbref.scenes import SCENES
 from tests.crosscheck.measured import MARGIN
+from tests.helpers.parts import Z, block, hinge
 
-Z = (0.0, 0.0, 1.0)
 TIMES = np.array([0.0, 0.01, 0.02, 0.03])
 SCENES_COMPARED = ("spatial_slider_crank_gravity", "planar_slider_crank_gravity", "door")
 MEASURED = {  # error / the largest reaction, at the finest settings: (unique parts, resultants)
@@ -75,3 +75,45 @@ def test_engines_have_the_exact_unique_reactions_and_resultants(name):
         parts, resultants = (MARGIN * error for error in measured[name])
         assert unique < parts, f"{label}: unique reaction of {worst} is off by {unique:.2e}"
         assert found.resultant < resultants, f"{label}: resultants are off by {found.resultant:.2e}"
+
+
+# two leaves: the first on hinges A and B of the ground, the second on hinge C of the first; all axes along z
+LEAVES = Scene(
+    name="door",
+    body=(block("a", (1.0, 0.0, 0.0)), block("b", (3.0, 0.0, 0.0))),
+    joint=(
+        hinge("A", "ground", "a", (0.0, 0.0, 0.0)),
+        hinge("B", "ground", "a", (0.0, 0.0, 2.0)),
+        hinge("C", "a", "b", (2.0, 0.0, 0.0)),
+    ),
+    gravity=(0.0, 0.0, 0.0),
+)
+POSE = initial_poses(LEAVES)
+
+
+def at_rest(**forces: tuple[float, ...]) -> Trajectory:
+    """Both bodies at rest at three times; joints with the given wrenches."""
+    place, turn = np.stack([POSE[0]] * 3), np.stack([POSE[1]] * 3)
+    still, times = np.zeros((3, 2, 3)), np.array([0.0, 0.5, 1.0])
+    reactions = {name: np.tile(wrench, (3, 1)).astype(float) for name, wrench in forces.items()} or None
+    made = Trajectory("door", "e", "1", "m", {}, times, ("a", "b"), place, turn, still, still)
+    return made if reactions is None else Trajectory(**{**vars(made), "reactions": reactions})
+
+
+ONE = at_rest(A=(0, 0, 3, 0, 0, 0), B=(0, 0, 1, 0, 0, 0), C=(7, 0, 0, 0, 0, 0))
+OTHER = at_rest(A=(0, 0, 1, 0, 0, 0), B=(0, 0, 3, 0, 0, 0), C=(7, 0, 0, 0, 0, 0))
+
+
+def test_reactions_that_hinges_share_are_listed_by_joint_and_run():
+    """Hinges A and B share the force along their axis: A has 3 N or 1 N of 4 N. C's reaction is unique and
+    not listed; nor is a run without reactions."""
+    found = side_by_side(LEAVES, {"one": ONE, "none": at_rest(), "other": OTHER}, 1)
+    assert set(found) == {"A", "B"}
+    assert found["A"] == pytest.approx({"one": 3.0, "other": 1.0})
+
+
+def test_hinges_that_share_a_force_otherwise_have_equal_unique_reactions():
+    """Shares of A differ by 2 N of the largest force, 7 N; C's reaction and the resultants are equal."""
+    compared = compare(LEAVES, ONE, OTHER)
+    assert compared.joints["C"].shared == 0 and compared.joints["C"].unique == 0.0
+    assert compared.joints["A"].chosen == pytest.approx(2 / 7) and compared.resultant == pytest.approx(0.0)

@@ -1,4 +1,5 @@
-"""Closed loops with anchors, axes and orientations of 6 or 8 digits / one reading by judge and engines."""
+"""Loops whose numbers have 6 or 8 digits, and axes perpendicular to rounding: one reading by judge and
+engines."""
 
 from typing import Any
 
@@ -7,12 +8,16 @@ import pytest
 
 import mbref
 from crosscheck.conformance.initial_accelerations import PRINCIPLE, compare
+from crosscheck.engine import Setting
 from crosscheck.judge.constraints import closure, initial_poses
+from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.gauss_principle import gauss, rank, singular_values
+from crosscheck.judge.model_identity import gate, gate_times
+from crosscheck.processes.serve import run_once
 from mbref import rotations, simulate
 from mbref.method import Method
 from mbref.motions.trajectory import Outcome
-from mbref.scene import Scene
+from mbref.scene import Body, Scene, Universal
 from mbref.scenes import find_scene
 from mbref.simulation.advice import advice_on_rounding
 from mbref.simulation.runs import start_run
@@ -113,3 +118,51 @@ def test_scene_in_full_digits_gets_no_advice_on_rounding(name):
     """Scenes that start in a singular position, or have redundant rows, are no sign of rounded numbers."""
     run = start_run(find_scene(name), Method.parse("taylor"), np.array([0.1]), Limits())
     assert advice_on_rounding(run) == ""
+
+
+FIRST = np.array([1.0, 0.2, -0.3])
+ACROSS = np.array([0.2, -1.0, 0.0])  # perpendicular to FIRST
+ROUNDED = 1e-14  # some roundings of numbers up to 2
+SETTINGS = {
+    "mbref": Setting("taylor", {"rtol": 1e-9}),
+    "mujoco": Setting("tuned", {"step": 1e-5, "beta": 100.0, "hard": 1e-7}),
+    "pinocchio": Setting("baumgarte", {"step": 1e-5}),
+    "exudyn": Setting("trapezoidal", {"step": 1e-5}),
+}
+
+
+def pendulum(cosine: float) -> Scene:
+    """A body on a universal joint whose second axis leans by a cosine towards the first."""
+    first, across = FIRST / np.linalg.norm(FIRST), ACROSS / np.linalg.norm(ACROSS)
+    second = 2.0 * (across + cosine * first)
+    joint = Universal(name="U", bodies=("ground", "b"), anchor=(0, 0, 0), axes=(tuple(FIRST), tuple(second)))
+    body = Body(name="b", mass=1.0, inertia=(0.01, 0.02, 0.03), position=(0.3, 0.1, 0.0))
+    return Scene(name="u", body=(body,), joint=(joint,), gravity=(0.0, 0.0, -9.81), duration=0.2)
+
+
+@pytest.mark.parametrize("cosine", [1e-14, 1e-6, 0.04, -0.04])
+def test_second_axis_of_a_universal_joint_is_made_perpendicular(cosine):
+    """The second axis leans by a cosine towards the first. It loses this part and keeps its length 2; the
+    first stays, and the judge finds the pose closed."""
+    first, second = map(np.array, pendulum(cosine).joint[0].axes)
+    assert tuple(first) == tuple(FIRST)
+    assert abs(first @ second) <= ROUNDED * np.linalg.norm(first) * np.linalg.norm(second)
+    assert second == pytest.approx(2.0 * ACROSS / np.linalg.norm(ACROSS), abs=ROUNDED)
+    gap = closure(pendulum(cosine), np.zeros(1), *(a[None] for a in initial_poses(pendulum(cosine))))["U"]
+    assert np.abs(gap).max() <= ROUNDED
+
+
+@pytest.mark.parametrize("cosine", [1e-16, 0.04])
+def test_second_reading_leaves_the_axes_unchanged(cosine):
+    """A joint that is made from the axes of another one has them to the last bit."""
+    joint = pendulum(cosine).joint[0]
+    assert Universal(**dict(joint)).axes == joint.axes
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_engine_corrects_skew_axes_as_the_judge(name):
+    """The axes of the universal joint lean by a cosine of 0.04. ``gate`` compares the engine's short motion
+    with the judge's by Gauss's principle and finds no difference."""
+    scene = pendulum(0.04)
+    exact = gauss_motion(scene, tuple(gate_times(scene)))
+    assert gate(scene, [exact, run_once(name, scene, gate_times(scene), SETTINGS[name])]) is None

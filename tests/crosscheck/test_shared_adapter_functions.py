@@ -1,7 +1,6 @@
 """Parts that adapters share / steps, samples, frames, coordinates and refusals worked out by hand."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,12 +16,10 @@ from tests.helpers.parts import X, Z
 HINGE = Revolute(name="H", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 2.0))
 
 
-def body(name: str = "b", **parts: Any) -> Body:
-    return Body(**{"name": name, "mass": 4, "inertia": (1, 2, 3), "position": (1, 2, 3), **parts})
-
-
-def scene(*bodies: Body, **parts: Any) -> Scene:
-    return Scene(**{"name": "s", "body": bodies or (body(),), "joint": (HINGE,), "duration": 2.0, **parts})
+def scene(*loads: Moment | Force) -> Scene:
+    """Return a body on a hinge for 2 s."""
+    body = Body(name="b", mass=4.0, inertia=(1.0, 2.0, 3.0), position=(1.0, 2.0, 3.0))
+    return Scene(name="s", body=(body,), joint=(HINGE,), duration=2.0, load=loads)
 
 
 def test_switched_and_tabulated_loads_are_refused_for_steps_that_cannot_end_there():
@@ -31,18 +28,18 @@ def test_switched_and_tabulated_loads_are_refused_for_steps_that_cannot_end_ther
     table = Factor(table=((0.0, 0.0), (1.0, 1.0), (2.0, 3.0), (3.0, 4.0)))
     smooth = Moment(body="b", moment=Z, factor=Factor(sine=Sine(amplitude=1.0)))
     switched = Force(body="b", point=X, force=Z, factor=Factor(start=0.5))
-    assert unended_piece(scene(load=(smooth, Moment(body="b", moment=Z)))) is None
+    assert unended_piece(scene(smooth, Moment(body="b", moment=Z))) is None
     for load in (switched, Moment(body="b", moment=Z, factor=table)):
-        found = unended_piece(scene(load=(smooth, load)))
+        found = unended_piece(scene(smooth, load))
         assert found.owner is Owner.ADAPTER
         assert found.reason.startswith("load[1] follows a table or is switched")
 
 
-def sampled(t: float, **parts: Any) -> Sample:
-    zero = np.zeros((1, 3))
-    given = {"position": zero + t, "orientation": np.array([[1.0, 0, 0, 0]]), "acceleration": zero}
-    made = {"velocity": zero, "angular_velocity": zero, "angular_acceleration": zero, **given, **parts}
-    return Sample(**made)
+def sampled(t: float) -> Sample:
+    """Return a sample of a body at (t, t, t) m whose rates are zero."""
+    rates = ("velocity", "angular_velocity", "acceleration", "angular_acceleration")
+    zeros = {name: np.zeros((1, 3)) for name in rates}
+    return Sample(position=np.full((1, 3), t), orientation=np.array([[1.0, 0, 0, 0]]), **zeros)
 
 
 LABELS = {"engine": "e", "version": "1", "method": "m", "settings": {}}

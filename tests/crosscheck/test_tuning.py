@@ -1,6 +1,7 @@
 """Search for the cheapest setting: models of runs with known cost and error / the setting by hand."""
 
 from argparse import ArgumentTypeError
+from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any, NamedTuple
 
@@ -32,13 +33,14 @@ class Family(NamedTuple):
 
 
 class Modelled:
-    """A model of an engine's runs, with 1 / h right-hand sides; ``asked`` has family and step of each run."""
+    """A model of an engine's runs, with 1 / h right-hand sides; ``asked`` has family and step of each run.
+    ``changed`` gets each record and returns the one that the run has instead."""
 
-    def __init__(self, **families: Family) -> None:
-        self.families, self.asked = families, []
+    def __init__(self, changed: Callable[[dict], dict] = dict, **families: Family) -> None:
+        self.changed, self.families, self.asked = changed, families, []
 
     def __call__(self, cases: list[Case]) -> list[dict[str, Any]]:
-        return [self.record(case) for case in cases]
+        return [self.changed(self.record(case)) for case in cases]
 
     def record(self, case: Case) -> dict[str, Any]:
         order, factor, cost, longest = self.families[case.setting.family]
@@ -97,15 +99,13 @@ def test_cheapest_step_is_below_the_one_at_which_runs_fail():
 def test_no_coarser_step_is_tried_that_costs_as_much():
     """Steps longer than 0.1 cost as much as 0.1, as where samples bound the step: after the grid's two
     settings no coarser one is tried, and the answer has the work of 0.1, 10 right-hand sides."""
-    engine = Modelled(f=Family(order=4.0, factor=1e-12))
-    engine.record = lambda case, record=engine.record: _bounded(record(case))  # type: ignore[method-assign]
+    least = {"seconds": 1e-2, "rhs": 10}
+    engine = Modelled(
+        lambda record: record | {"cost": {name: max(record["cost"][name], least[name]) for name in least}},
+        f=Family(order=4.0, factor=1e-12),
+    )
     done = tuned(engine.cases(0.1, 0.05), 1e-3, engine)
     assert len(done.records) == 2 and work(done.reached[0]) == 10, done.records
-
-
-def _bounded(record: dict[str, Any]) -> dict[str, Any]:
-    seconds = max(record["cost"]["seconds"], 1e-2)
-    return {**record, "cost": {"seconds": seconds, "rhs": max(record["cost"]["rhs"], 10)}}
 
 
 def test_family_more_expensive_than_the_cheapest_is_abandoned():
@@ -139,22 +139,17 @@ def test_cheap_integrator_of_crosscheck_does_not_end_the_search_of_engine_famili
 
 def test_family_that_timed_out_is_abandoned():
     """The first run times out, and no other run is made."""
-    engine = Modelled(slow=Family(order=4.0, cost=1.0))
-    engine.record = lambda case, record=engine.record: {**record(case), "outcome": "TIMED_OUT"}  # type: ignore
+    engine = Modelled(lambda record: record | {"outcome": "TIMED_OUT"}, slow=Family(order=4.0, cost=1.0))
     assert not found(engine, 1e-9, 0.1, 0.01) and len(engine.asked) == 1, engine.asked
 
 
-def test_no_setting_reaches_an_error_below_the_truth_s_bound():
+@pytest.mark.parametrize(("bound", "found"), [(2e-9, 0), (1e-11, 1)])
+def test_no_setting_reaches_an_error_below_the_truth_s_bound(bound, found):
     """A truth known to 2e-9 cannot show an error below 1e-10, so that no setting is found; one known to 1e-11
     can. Runs have errors of 1e-15."""
-    for bound, count in ((2e-9, 0), (1e-11, 1)):
-        engine = Modelled(f=Family(order=4.0, factor=1e-3))
-        engine.record = lambda case, record=engine.record, bound=bound: _rough(record(case), bound)  # type: ignore
-        assert len(tuned(engine.cases(0.001, 0.0005), 1e-10, engine).reached) == count
-
-
-def _rough(record: dict[str, Any], bound: float) -> dict[str, Any]:
-    return {**record, "metrics": {**record["metrics"], "error_bound": bound}}
+    known = {"metrics": {"error": 1e-15, "error_bound": bound}}
+    engine = Modelled(lambda record: record | known, f=Family(order=4.0))
+    assert len(tuned(engine.cases(0.001, 0.0005), 1e-10, engine).reached) == found
 
 
 def test_steps_are_limited_by_the_longest_interval_between_samples():
@@ -176,14 +171,12 @@ def test_settings_of_steps_longer_than_the_samples_allow_are_not_chosen():
     """Samples are 0.1 s apart, so that longer steps run as 0.1 s. The error h² is zero by chance for settings
     of steps near 0.5 s: these are not run, and the answer is √1e-3 s."""
 
-    class Stabilised(Modelled):
-        def record(self, case):
-            record = super().record(case)
-            asked = case.setting.options[STEP]
-            error = 0.0 if 0.45 < asked < 0.55 else min(asked, 0.1) ** 2
-            return {**record, "metrics": {**record["metrics"], "error": error}}
+    def bounded(record):
+        step = record["metrics"]["error"] ** 0.5
+        error = 0.0 if 0.45 < step < 0.55 else min(step, 0.1) ** 2
+        return record | {"metrics": {"error": error, "error_bound": 1e-14}}
 
-    engine = Stabilised(f=Family(order=2.0))
+    engine = Modelled(bounded, f=Family(order=2.0))
     times = np.linspace(0.0, 1.0, 11)
     done = tuned([case._replace(times=times) for case in engine.cases(0.5, 0.05, 0.01)], 1e-3, engine)
     [cheapest] = done.cases
@@ -232,5 +225,6 @@ def test_length_option_takes_a_unit_and_means_metres_without(text, metres):
     ],
 )
 def test_length_option_refuses_zero_negative_and_unknown_units(text, says):
+    """``length`` reads the lengths of command lines."""
     with pytest.raises(ArgumentTypeError, match=says):
         length(text)
