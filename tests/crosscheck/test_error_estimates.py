@@ -7,7 +7,6 @@ import pytest
 
 from crosscheck.engine import Setting
 from crosscheck.processes import serve
-from crosscheck.processes.pool import run_isolated
 from crosscheck.study.grid import Case, run_case
 from crosscheck.study.record_view import public
 from mbref.motions.trajectory import Outcome
@@ -36,12 +35,6 @@ def test_an_estimate_that_needs_more_than_its_time_is_left_out_and_the_run_is_un
     found = run.to_record()["error_estimate"]
     assert found["largest"] is None and "more than 0 s" in found["reason"]
     assert np.array_equal(run.position, serve.run_once("mbref", SCENE, TIMES, LOOSE).position)
-
-
-def test_a_run_outside_a_study_has_no_estimate():
-    """`run_case` makes runs of a study, whose estimate is stored."""
-    assert run_case(Case(SCENE, TIMES, "mbref", LOOSE))["error_estimate"]["largest"] > 0
-    assert run_isolated("mbref", SCENE, TIMES, LOOSE, 60.0).to_record()["error_estimate"] is None
 
 
 def test_an_engine_without_estimates_has_none_in_its_record():

@@ -74,6 +74,9 @@ def angle(scene: Scene, trajectory: Trajectory) -> np.ndarray:
         ("five_bar", 0.1, "static", 1e-3, (8.1e-12, 3.3e-12)),
         ("spatial_slider_crank_driven", 0.2, "static", 1e-3, (7.6e-11, 3.6e-11)),
         ("planar_slider_crank_equal", 0.1, "alpha", 1e-4, (2.5e-4, 3.1e-4)),  # through a singular position
+        ("planar_slider_crank_equal", 0.13, "tuned", 1e-4, (7.1e-12, 1.1e-11)),  # through two
+        ("four_bar_gravity", 0.45, "tuned", 1.5e-3, (5.6e-12, 3.4e-12)),  # through one
+        ("five_bar", 0.04, "tuned", 2e-4, (2.6e-13, 8.6e-13)),  # driven through two
     ],
 )
 def test_exudyns_families_move_mechanisms_within_their_measured_errors(name, duration, family, step, errors):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from crosscheck.engine import GENERATORS, Owner, Setting, default_engines, engine
+from crosscheck.engine import GENERATORS, Owner, Setting, engine
 from crosscheck.engines.casadi import library
 from crosscheck.engines.shared import file_cache
 from crosscheck.engines.shared.symbolic.equations import TreeEquations
@@ -99,11 +99,6 @@ def test_scenes_without_symbolic_equations_are_refused_with_the_reason(name, sce
     """None are derived for a driver, a spring, a ball joint on the ground, or closures that are redundant."""
     found = engine(name).cannot(SCENES[scene]())
     assert found is not None and found.owner is Owner.ADAPTER and reason in found.reason, found
-
-
-def test_engines_with_generated_code_are_not_among_the_default_engines() -> None:
-    """MuJoCo is, and CasADi and heyoka are not, even if they are installed."""
-    assert "mujoco" in default_engines() and not {"casadi", "heyoka"} & set(default_engines())
 
 
 def test_casadi_refuses_scenes_if_no_c_compiler_is_installed(monkeypatch: pytest.MonkeyPatch) -> None:

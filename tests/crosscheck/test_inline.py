@@ -11,6 +11,7 @@ from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from crosscheck.judge.truth import truth_for
 from mbref.scene import Scene
+from tests.helpers.parts import Z, joint
 
 TIMES = np.array([0.0, 0.2, 0.5])
 ROUNDING = 1e-13  # m, m/s² or rad/s²; 500 roundings of numbers near 1
@@ -20,31 +21,25 @@ WIRE = (0.6, 0.0, -0.8)
 
 def bead(bodies: tuple[str, str], **more) -> Scene:
     """Return a body with a point on a wire that the first of ``bodies`` carries."""
-    joint = {"name": "J", "type": "inline", "bodies": bodies, "anchor": [0.3, 0.1, 0.0], "axis": WIRE}
-    return Scene(name="bead", gravity=(0.0, 0.0, -9.81), body=[{**BEAD, **more}], joint=[joint])
+    wire = joint("J", "inline", *bodies, (0.3, 0.1, 0.0), axis=WIRE)
+    return Scene(name="bead", gravity=(0.0, 0.0, -9.81), body=[{**BEAD, **more}], joint=[wire])
 
 
-def two_hinges(second: str) -> Scene:
-    """Return a shaft in two bearings: a hinge, and a joint of type ``second`` on the same axis."""
-    shaft = {"name": "shaft", "mass": 2.0, "inertia": [0.1, 0.12, 0.02], "position": [0.05, 0.0, 0.4],
-             "angular_velocity": [0.0, 0.0, 5.0]}  # fmt: skip
+def shaft(*kinds: str) -> Scene:
+    """Return a shaft in two bearings on one axis, joints of two types."""
+    body = {"name": "shaft", "mass": 2.0, "inertia": [0.1, 0.12, 0.02], "position": [0.05, 0.0, 0.4]}
+    axes = [{} if kind == "spherical" else {"axis": Z} for kind in kinds]
     bearings = [
-        {"name": name, "type": kind, "bodies": ["ground", "shaft"], "anchor": [0.0, 0.0, z],
-         "axis": [0.0, 0.0, 1.0]}
-        for name, kind, z in (("A", "revolute", 0.0), ("B", second, 1.0))
-    ]  # fmt: skip
-    return Scene(name="shaft", gravity=(-9.81, 0.0, 0.0), body=[shaft], joint=bearings)
+        joint("AB"[k], kinds[k], "ground", "shaft", (0.0, 0.0, float(k)), **axes[k]) for k in range(2)
+    ]
+    turning = {**body, "angular_velocity": [0.0, 0.0, 5.0]}
+    return Scene(name="shaft", gravity=(-9.81, 0.0, 0.0), body=[turning], joint=bearings)
 
 
 SCENES = {
     "wire on the ground": bead(("ground", "bead")),
     "wire on the body": bead(("bead", "ground"), angular_velocity=[0.5, 1.0, -2.0]),
-    "beside a spherical joint": two_hinges("inline").with_(
-        joint=[
-            {"name": "A", "type": "spherical", "bodies": ["ground", "shaft"], "anchor": [0.0, 0.0, 0.0]},
-            *two_hinges("inline").joint[1:],
-        ]
-    ),
+    "beside a spherical joint": shaft("spherical", "inline"),
 }
 each = pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
 
@@ -101,8 +96,8 @@ def test_engines_without_inline_joints_refuse_them_by_their_type(name):
 def test_an_inline_joint_in_place_of_a_second_bearing_leaves_fewer_redundant_rows():
     """Of two hinges five rows are redundant, of a hinge and an inline joint two, of a ball and an inline
     joint none; the shaft keeps one freedom."""
-    assert mbref.diagnose(two_hinges("revolute")).counts.redundant == 5
-    cured = mbref.diagnose(two_hinges("inline")).counts
+    assert mbref.diagnose(shaft("revolute", "revolute")).counts.redundant == 5
+    cured = mbref.diagnose(shaft("revolute", "inline")).counts
     assert (cured.redundant, cured.degrees_of_freedom) == (2, 1)
     ball = mbref.diagnose(SCENES["beside a spherical joint"]).counts
     assert (ball.redundant, ball.degrees_of_freedom) == (0, 1)

@@ -48,14 +48,8 @@ WAYS: dict[str, tuple[str, Setting, float]] = {
     "heyoka": ("heyoka", Setting("taylor", {"rtol": 1e-9}), 1e-6),
     "newton": ("newton", Setting("lox", {"step": 5e-4, "alpha": 0.01}), 5e-3),
 }
-# kinds of defects, which each adapter could have
-KINDS = LOAD, FRAME, ORDER, START, UNITS = (
-    "sign of a load",
-    "frame or sign of a reaction",
-    "order of bodies",
-    "initial velocities",
-    "units",
-)
+LOAD, FRAME, START = "sign of a load", "frame or sign of a reaction", "initial velocities"
+KINDS = (LOAD, FRAME, START, "order of bodies", "units")  # of defects, which each adapter could have
 UNABLE = {  # an adapter and the kinds of defects that it cannot have
     "bullet": {FRAME: "Bullet's steps give no reactions"},
     "mjx": {FRAME: "MJX gives no reactions"},

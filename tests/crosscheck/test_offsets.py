@@ -13,15 +13,9 @@ from crosscheck.recorded.exact import reference_table
 from crosscheck.recorded.judgement import judge_motion
 from mbref import formats
 from mbref.scene import Scene, SceneError
-from tests.helpers.coupled_mechanisms import coupled_loops, gear_pair, rack, screw
+from tests.helpers.coupled_mechanisms import coupled_loops, gear_pair, rack
 
 TIMES = np.array([0.0, 0.2, 0.4])
-OFFSETS = (
-    (gear_pair, "teeth", 0.4),
-    (rack, "teeth", 0.003),
-    (screw, "thread", -0.2),
-    (coupled_loops, "gears", 0.1),
-)
 FINE = {
     "mbref": Setting("taylor", {"rtol": 1e-12}),
     "mujoco": Setting("tuned", {"step": 2e-4, "beta": 2500.0, "hard": 1.0}),
@@ -52,8 +46,8 @@ def test_start_that_opens_a_joint_is_refused():
 
 @pytest.mark.parametrize("name", ["mujoco", "exudyn", "simbody", "drake", "dart"])
 def test_engine_moves_a_coupling_with_offset_as_the_reference(name):
-    """The offset is 0.1 rad; engine and reference start from the assembled poses. The error is at most 1e-8
-    of the length."""
+    """The offset is 0.1 rad; engine and judge start from the assembled poses. At the engine's finest setting
+    the error from the judge's truth is at most 1e-8 of the length or rad."""
     modules = {"simbody": "opensim", "drake": "pydrake", "dart": "dartpy"}
     pytest.importorskip(modules.get(name, name))
     scene, simulator = shifted(coupled_loops, "gears", 0.1).with_(duration=0.2), engine(name)
@@ -74,7 +68,8 @@ def test_engines_refuse_a_scene_that_is_not_assembled():
 
 
 def test_coordinates_of_a_reference_table_count_from_the_file_s_poses():
-    """The coupling's equation s = 0.003 m + 0.05 m · φ holds in them; the angle is also mbref's."""
+    """The coupling's equation s = 0.003 m + 0.05 m · φ holds for displacement and angle of the table to 1e-13
+    m; the angle is also mbref's, to 1e-11 rad."""
     scene = shifted(rack, "teeth", 0.003)
     table = reference_table(scene, TIMES)
     motion = mbref.simulate(scene, times=TIMES, rtol=1e-13)
@@ -100,8 +95,8 @@ def test_find_scenes_assembles_offsets_and_read_scenes_does_not(tmp_path):
 
 
 def test_mjcf_keeps_the_offset_of_a_coupling(tmp_path):
-    """The rack returns from its MJCF with its motion by mbref, to rounding; the motion without the offset of
-    3 mm is over 2 mm away."""
+    """The rack returns from its MJCF with its motion by mbref, to 1e-12 m; the motion without the offset of 3
+    mm is over 2 mm away."""
     pytest.importorskip("mujoco")
     scene, path = shifted(rack, "teeth", 0.003), tmp_path / "rack.xml"
     formats.write(scene, path)

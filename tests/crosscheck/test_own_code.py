@@ -29,8 +29,8 @@ MODEL = (
     ],
 )
 def test_shown_mjcf_and_python_set_the_options_of_a_mujoco_run(family, options):
-    """A model with the shown XML and Python has the options, softness and regularisers of the adapter's
-    model. Regularisers agree to rounding."""
+    """A model with the shown XML and Python has the options and softness of the adapter's model. Its inverse
+    weights, which regularise the closures, are MuJoCo's times the option ``hard``, to rounding."""
     mujoco = pytest.importorskip("mujoco")
     from crosscheck.engines.mujoco.simulation import Simulation
 
@@ -66,7 +66,8 @@ def test_family_defaults_of_mujoco_leaves_every_option_as_the_library_has_it():
 @pytest.mark.parametrize("name", ["planar_slider_crank", "spatial_slider_crank"])
 @pytest.mark.parametrize("family", ["defaults", "trapezoidal", "alpha"])
 def test_shown_python_sets_the_settings_of_an_exudyn_run(name, family):
-    """The executed line makes the settings and solver type that the adapter uses, not Exudyn's defaults."""
+    """The shown line is executed with a recorder in place of Exudyn's system. It makes the settings and the
+    solver type that the adapter uses, which differ from Exudyn's defaults."""
     exu = pytest.importorskip("exudyn")
     from crosscheck.engines.exudyn.adapter import DYNAMIC
     from crosscheck.engines.exudyn.dynamic import Solver
@@ -90,7 +91,8 @@ class _Solving:
 
 
 def test_shown_python_sets_the_solver_of_a_pinocchio_run():
-    """The executed code has the adapter's accuracies, iterations, Baumgarte gains and step."""
+    """The shown code is executed on closures of its own. Then accuracies, iterations, step and the closures'
+    Baumgarte gains are those of the adapter's simulation."""
     pinocchio = pytest.importorskip("pinocchio")
     from crosscheck.engines.pinocchio.simulation import Simulation
 

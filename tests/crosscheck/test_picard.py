@@ -20,7 +20,8 @@ def test_solution_with_a_pole_ends_at_the_pole():
 
 
 def test_panels_reach_rounding_error_over_many_periods():
-    """The sine over 48 periods, by y'' = -y, to 1e-14; the solver computes in extended precision."""
+    """y'' = -y from (0, 1) is the sine. Over 48 periods it is off by less than 1e-14, 50 roundings of
+    doubles; the solver computes in extended precision."""
     t = np.linspace(0, 300.0, 50)
     got = Solution(lambda y: np.stack([y[:, 1], -y[:, 0]], axis=1), np.array([0.0, 1.0]), 0.1)(t)
     assert np.abs(got[:, 0].astype(float) - np.sin(t)).max() < 1e-14

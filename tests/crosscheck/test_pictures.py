@@ -82,10 +82,3 @@ def test_run_takes_an_option_that_its_sweep_does_not_vary(capsys):
     asked = "run four_bar --engine mbref --setting taylor --option branches=[[2,2]] --times 0.05"
     assert main([*asked.split(), "--json"]) == 0
     assert '"branches": [[2, 2]]' in capsys.readouterr().out
-
-
-def test_unknown_option_of_a_family_is_refused_with_the_known_ones(capsys):
-    """Option "branch" of ``crosscheck run`` is misspelt: exit status 2; the message lists rtol, branches."""
-    asked = "run four_bar --engine mbref --setting taylor --option branches=[[2,2]] --times 0.05"
-    assert main([*asked.replace("branches", "branch").split()]) == 2
-    assert "has no option 'branch'; it has: rtol, branches; did you mean" in capsys.readouterr().err

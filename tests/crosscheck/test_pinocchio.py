@@ -58,7 +58,8 @@ def test_default_and_proximal_solver_agree_with_the_truth_without_redundancy() -
 
 
 def test_baumgarte_removes_most_of_the_drift_of_rk4() -> None:
-    """By the truth, at steps of 0.15 ms: less than 0.3 of the error without feedback ("proximal") is left."""
+    """Errors from the judge's truth over 0.2 s, at steps of 0.15 ms: with feedback less than 0.3 of the error
+    without it ("proximal") is left; 0.3 is "most"."""
     scene = SCENES["planar_slider_crank"]()
     errors = {
         f: completed_error(simulate(scene, 0.2, f, step=1.5e-4), scene) for f in ("proximal", "baumgarte")
@@ -68,7 +69,8 @@ def test_baumgarte_removes_most_of_the_drift_of_rk4() -> None:
 
 def test_projection_keeps_the_branch_of_the_driven_four_bar() -> None:
     """The rhombus is flat at 0.0126 and 0.0378 s. DOP853 with projection ("tuned") follows the closed form to
-    0.1 s; without it, the run goes on past the second time and ends before 0.1 s, not finite."""
+    0.1 s, to 1e-13 m or rad; without it, the run goes on past the second time and ends before 0.1 s, not
+    finite."""
     scene = SCENES["four_bar"]()
     options = {"rtol": 1e-8, "min_step": 2e-4}
     plain, projected = (simulate(scene, 0.1, family, **options) for family in ("dop853", "tuned"))
@@ -77,7 +79,7 @@ def test_projection_keeps_the_branch_of_the_driven_four_bar() -> None:
 
 
 def test_pinocchio_follows_a_driver_exactly_at_a_loose_tolerance() -> None:
-    """The sled's way is 0.5 t + 0.05 sin 7 t (m), to rounding at a tolerance of 1e-3: drivers prescribe
+    """The sled's way is 0.5 t + 0.05 sin 7 t (m), to 1e-14 m at a tolerance of 1e-3: drivers prescribe
     coordinates of the tree and are not integrated."""
     scene = driven()
     run = engine("pinocchio").run(

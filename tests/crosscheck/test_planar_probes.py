@@ -38,7 +38,8 @@ def test_planar_engine_is_run_on_at_least_twenty_loops():
 
 @pytest.mark.parametrize("name", ["pinocchio", "mujoco"])
 def test_spatial_engine_gets_planar_probes_only_by_name(name):
-    """MuJoCo and Pinocchio are tried on spatial probes; a request by name gives a planar one too."""
+    """MuJoCo and Pinocchio map joints in space: by default no probe is planar. A request by its name gives a
+    planar one, here a four-bar with a spring."""
     assert not is_planar(engine(name))
     assert not {s.scene.name for s in find_specimens(None, 0.0, name)} & set(planar_loops())
     assert find_specimens(["planar four-bar: spring"], 0.0, name)[0].scene.load

@@ -60,7 +60,8 @@ def test_warp_sweeps_the_finest_step_only_with_loops_or_couplings() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MODULES)
 def test_port_and_mujoco_in_c_stay_within_their_measured_errors(name: str) -> None:
-    """A four-bar with balls over 0.05 s at steps of 1 ms; IN_C and LOOP state the measured errors."""
+    """A four-bar with balls over 0.05 s at steps of 1 ms. Errors from the judge's truth are at most ten times
+    the measured 8.2e-9 of MuJoCo in C, 6.1e-6 of MJX and 1.4e-7 of Warp, of the length or rad."""
     if not is_installed(MODULES[name]):
         pytest.skip(f"{MODULES[name]} is not installed")
     scene = Scene.from_file(FOLDER / "ball_four_bar.toml").with_(duration=0.05)
@@ -84,9 +85,9 @@ SINGLE = {
 @pytest.mark.parametrize("name", MODULES)
 @pytest.mark.parametrize("mechanism", APART)
 def test_single_and_double_precision_differ_by_rounding(name: str, mechanism: str) -> None:
-    """The port in one precision and the port, or MuJoCo in C, in the other. A difference above MARGIN times
-    the measured one is a defect of the port; one below 1e-9, single precision's rounding, means that both are
-    double."""
+    """The port in one precision and the port, or MuJoCo in C, in the other. A difference above ten times the
+    measured one (APART) is a defect of the port; one below 1e-9, less than single precision's rounding, means
+    that both are double."""
     if not is_installed(MODULES[name]):
         pytest.skip(f"{MODULES[name]} is not installed")
     column = next(column for column in DIFFICULTIES if column.scene == mechanism)

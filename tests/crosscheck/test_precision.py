@@ -34,7 +34,8 @@ def test_array_in_single_precision_is_named(bench, name):
 
 
 def test_reaction_in_single_precision_is_named_with_its_joint(bench):
-    """The wrenches of joint J are rounded to single precision."""
+    """In the judge's exact run the wrenches of joint J are rounded to single precision; nothing else is
+    named."""
     wrenches = bench.close.reactions.items()
     single = replace(bench.close, reactions={n: rounded(w) if n == "J" else w for n, w in wrenches})
     assert single_precision(bench.scene, single) == ["reaction in J"]
@@ -49,7 +50,8 @@ def test_quaternions_of_alternating_sign_are_no_noise(bench):
 
 
 def test_constant_simple_and_tiny_numbers_do_not_count_as_single_precision(bench):
-    """Such numbers may have few bits in double precision too: a constant, multiples of 1/8, up to 1e-7."""
+    """Such numbers may have few bits in double precision too: a constant 0.1, multiples of 1/8, and numbers
+    of 1e-9 steps, in place of the exact run's accelerations."""
     run = bench.close
     shape = run.acceleration.shape
     steps = np.arange(shape[0])[:, None, None] * np.ones(shape)

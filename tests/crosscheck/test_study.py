@@ -115,7 +115,7 @@ def test_process_pool_gives_the_records_of_a_serial_study(one_after_the_other: l
 
 
 def test_run_in_a_child_gives_the_record_of_a_run_here():
-    """Except for times, and for the estimate of the error, which only the child makes."""
+    """Except for times, and for mbref's estimate of its error, which only the child of a study makes."""
     wanted = Case(SCENES["four_bar"](), TIMES, "mbref", Setting("mpi-svd+projection", {"rtol": 1e-6}))
     here, child = untimed([run_here(wanted)]), untimed([run_case(wanted)])
     assert here[0].pop("error_estimate") is None and child[0].pop("error_estimate")["largest"] > 0

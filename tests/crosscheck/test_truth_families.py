@@ -58,7 +58,7 @@ def apart(scene, other):
     "name", ["planar_slider_crank_gravity", "spatial_slider_crank_gravity", "four_bar_gravity"]
 )
 def test_truth_does_not_depend_on_the_sign_of_an_axis(name):
-    """All axes of the undriven scene's joints are reversed."""
+    """All axes of the undriven scene's joints are reversed; poses stay equal to 1e-13 m or rad."""
 
     def flipped(joint):
         axis = getattr(joint, "axis", None)
@@ -71,8 +71,8 @@ def test_truth_does_not_depend_on_the_sign_of_an_axis(name):
     "name", ["four_bar", "spatial_slider_crank_driven", "pendulum_driven", "block_driven"]
 )
 def test_exchanged_bodies_of_joints_and_an_opposite_driver_give_an_equal_motion(name):
-    """The angle of a joint counts from its first body to the second, so that the exchange reverses its
-    sign."""
+    """The angle of a joint counts from its first body to the second, so that the exchange reverses its sign.
+    Poses are equal to 1e-13 m or rad."""
 
     def swapped(joint):
         axes = {"axes": joint.axes[::-1]} if isinstance(joint, Universal) else {}
@@ -87,7 +87,8 @@ def test_exchanged_bodies_of_joints_and_an_opposite_driver_give_an_equal_motion(
 
 @pytest.mark.parametrize(("joint", "rate"), [("A", -124.8), ("D", -124.8), ("E", 124.8), ("F", -124.8)])
 def test_five_bar_driven_at_any_joint_moves_alike(joint, rate):
-    """Cranks turn at -124.8 rad/s against the ground, and the bar turns the other way against a crank (E)."""
+    """Cranks turn at -124.8 rad/s against the ground, and the bar turns the other way against a crank (E).
+    The judge's truths, by different drivers of one parallelogram, are equal to 1e-13 m or rad."""
     scene = ALL["five_bar"]
     assert apart(scene, scene.with_(driver=(Driver(joint=joint, polynomial=(0.0, rate)),))) < ROUNDED
 

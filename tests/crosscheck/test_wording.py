@@ -6,6 +6,7 @@ from crosscheck.study.words import text
 
 
 def test_list_is_joined_by_commas_and_the_word_and():
+    """Lists of none, one, two and three names."""
     assert [text.listed(names) for names in ([], "a", "ab", "abc")] == ["", "a", "a and b", "a, b and c"]
 
 
@@ -25,6 +26,7 @@ def test_error_is_rounded_up_or_called_less_than_the_bound(value, bound, said):
 
 
 def test_times_and_ratios_are_rounded_across_their_units():
+    """Three digits and two digits: 0.9996 s are 1 s, not 1000 ms; 9.95 times are 10 times, not 9.9."""
     assert [text.seconds(t) for t in (1.0, 0.999, 1e-3, 9.99e-4)] == ["1 s", "999 ms", "1 ms", "999 µs"]
     assert [text.seconds(t) for t in (0.9996, 0.9994, 9.996e-4)] == ["1 s", "999 ms", "1 ms"]
     assert [text.multiple(r) for r in (9.94, 9.95)] == ["9.9 times", "10 times"]
