@@ -79,6 +79,8 @@ class Supports:
         Highest power of the first coordinate in a coupling.
     intervals : bool
         Joints and couplings that hold in intervals of time.
+    conditions : bool
+        Joints and couplings that begin to hold at a value of a coordinate, or that a reaction releases.
     stops : bool
         End stops of joint coordinates.
     """
@@ -93,6 +95,7 @@ class Supports:
     sums: bool = False
     powers: int = 1
     intervals: bool = False
+    conditions: bool = False
     stops: bool = False
 
     def missing(self, scene: Scene) -> Cannot | None:
@@ -114,10 +117,7 @@ class Supports:
     def _missing(self, scene: Scene) -> Iterator[str]:
         links = [] if self.massless_links else [body.name for body in scene.body if body.mass == 0]
         yield from (f"body {name!r} is a massless link" for name in links)
-        if not self.intervals:
-            yield from (f"{path} has intervals" for path in intermittent(scene) if path.endswith(".active"))
-        if not self.stops:
-            yield from (f"joint {joint.name!r} has an end stop" for joint in scene.joint if joint.end_stop)
+        yield from self._missing_events(scene)
         for joint in scene.joint:
             if joint.type not in self.joints:
                 yield f"joint {joint.name!r} is of type {joint.type!r}"
@@ -135,6 +135,15 @@ class Supports:
                 yield f"load[{k}] is of type {load.type!r}"
             if load.over_time and FACTOR not in self.over_time:
                 yield f"load[{k}] changes with time"
+
+    def _missing_events(self, scene: Scene) -> Iterator[str]:
+        for path in intermittent(scene):
+            if path.endswith(".active") and not self.intervals:
+                yield f"{path} has intervals"
+            if path.endswith((".when", ".release")) and not self.conditions:
+                yield f"{path} is a condition"
+        if not self.stops:
+            yield from (f"joint {joint.name!r} has an end stop" for joint in scene.joint if joint.end_stop)
 
     def _missing_of_couplings(self, scene: Scene) -> Iterator[str]:
         for coupling in scene.coupling:

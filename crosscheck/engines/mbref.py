@@ -85,6 +85,7 @@ class Mbref(Engine):
         powers=MOST_POWERS,
         stops=True,
         intervals=True,
+        conditions=True,
     )
 
     def version(self) -> str:

@@ -13,7 +13,7 @@ from crosscheck.judge.energy import energy_balance
 from crosscheck.judge.impacts import Impact
 from crosscheck.judge.joint_reactions import resultants
 from crosscheck.judge.loads import world_inertia
-from crosscheck.judge.pieces import State, at_start, followed, has_pieces, later, permanent
+from crosscheck.judge.pieces import State, at_start, followed, has_pieces, later, names_of, permanent
 from crosscheck.judge.stops import bounced, ends_of, held, hits
 from mbref import rotations
 from mbref.motions.event import Event
@@ -56,8 +56,9 @@ def _after(scene: Scene, piece: Scene, event: Event) -> Scene:
     """Return the piece that begins at an event of a run, with the velocities that the judge finds from the
     run's velocities before it: they obey the constraints exactly."""
     before, moved = _before(event), _moved(scene, event)
-    after = later(scene, piece, event.time, before, moved)
-    return later(scene, piece, event.time, _jump(scene, after, event).state, moved)
+    names = (names_of(piece) | {*event.engaged}) - {*event.released}
+    after = later(scene, piece, event.time, before, moved, names)
+    return later(scene, piece, event.time, _jump(scene, after, event).state, moved, names)
 
 
 def _jump(scene: Scene, after: Scene, event: Event) -> Impact:
@@ -76,7 +77,7 @@ def _before(event: Event) -> State:
 
 def _moved(scene: Scene, event: Event) -> dict[str, np.ndarray]:
     """Return angle (rad, as the run counted it, or NaN) and displacement (m) (2,) of followed joints."""
-    joints = [permanent(joint) for joint in scene.joint if joint.active is None]
+    joints = [permanent(joint) for joint in scene.joint if joint.is_permanent]
     always = scene.with_(joint=joints, coupling=(), load=())
     pose = event.position[None], event.orientation[None], 0.0 * event.angular_velocity[None]
     found = joint_coordinates(always, np.zeros(1), *pose)

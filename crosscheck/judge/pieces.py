@@ -1,4 +1,4 @@
-"""Pieces of a motion between the times at which joints and couplings begin or cease to hold, by the judge.
+"""Pieces of a motion between the events at which joints and couplings begin or cease to hold, by the judge.
 
 A piece is a scene of its own, whose time counts from its begin.  A joint begins to hold at the anchor and the
 axis that its first body carries; the second body then carries the anchor.  A distance joint keeps the
@@ -7,7 +7,7 @@ distance, and a coupling the sum, of the moment at which it begins to hold.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +20,13 @@ from mbref.scene.joints import ANGLE
 
 MISSED = 1e-6  # gap of a given pose (lengths of the mechanism, or rad) above which a joint cannot engage
 AT_REST = 1e-12  # velocity after an impact / speed of the scene, below which bodies have come to rest
-PERMANENT: dict[str, Any] = {"active": None, "engages": "anywhere"}
+PERMANENT: dict[str, Any] = {
+    "active": None,
+    "when": None,
+    "release": None,
+    "holds_at_start": None,
+    "engages": "anywhere",
+}
 
 
 class State(NamedTuple):
@@ -52,15 +58,24 @@ def _fastest(state: State, length: float) -> float:
 
 
 def has_pieces(scene: Scene) -> bool:
-    """Return whether a joint or a coupling of the scene has intervals, or a joint an end stop."""
-    sometimes = any(part.active is not None for part in (*scene.joint, *scene.coupling))
+    """Return whether a joint or a coupling of the scene comes and goes, or a joint has an end stop."""
+    sometimes = not all(part.is_permanent for part in parts_of(scene))
     return sometimes or any(joint.end_stop is not None for joint in scene.joint)
 
 
+def parts_of(scene: Scene) -> tuple[Joint | Coupling, ...]:
+    """Return the joints and couplings of a scene."""
+    return (*scene.joint, *scene.coupling)
+
+
+def names_of(scene: Scene) -> set[str]:
+    """Return the names of the joints and couplings of a scene."""
+    return {part.name for part in parts_of(scene)}
+
+
 def events(scene: Scene, end: float) -> list[float]:
-    """Return the times (s) in (0, end] at which a joint or a coupling begins or ceases to hold."""
-    parts = (*scene.joint, *scene.coupling)
-    times = {time for part in parts for interval in part.active or () for time in interval}
+    """Return the times (s) in (0, end] at which an interval of a joint or a coupling begins or ends."""
+    times = {time for part in parts_of(scene) for interval in part.active or () for time in interval}
     return sorted(time for time in times if 0.0 < time <= end)
 
 
@@ -69,13 +84,29 @@ def at_start(scene: Scene) -> Scene:
     if not has_pieces(scene):
         return scene
     return scene.with_(
-        joint=[permanent(part) for part in scene.joint if holds(part, 0.0)],
-        coupling=[permanent(part) for part in scene.coupling if holds(part, 0.0)],
+        joint=[permanent(part) for part in scene.joint if part.starts_held],
+        coupling=[permanent(part) for part in scene.coupling if part.starts_held],
     )
 
 
+def changed(scene: Scene, before: Scene, t: float, met: Collection[str] = ()) -> set[str]:
+    """Return the names of the joints and couplings that hold after an event at t (s).
+
+    ``before`` is the piece that ends there. Intervals begin or end; conditions are met of the parts ``met``,
+    which change between holding and not.
+    """
+    names = names_of(before)
+    for part in parts_of(scene):
+        first, last = zip(*part.active, strict=True) if part.active else ((), ())
+        if t in last or (part.name in met and part.name in names):
+            names -= {part.name}
+        elif (t in first and t and not part.when) or part.name in met:
+            names |= {part.name}
+    return names
+
+
 def holds(part: Any, t: float) -> bool:
-    """Return whether a joint or a coupling holds from t (s) on."""
+    """Return whether a joint or a coupling holds from t (s) on by its intervals."""
     return part.active is None or any(first <= t < last for first, last in part.active)
 
 
@@ -89,8 +120,16 @@ def _always(part: Any) -> dict[str, Any]:
     return {**PERMANENT, "stop": None} if getattr(part, "end_stop", None) else PERMANENT
 
 
-def later(scene: Scene, before: Scene, t: float, state: State, moved: Mapping[str, np.ndarray]) -> Scene:
-    """Return the piece that begins at t (s) in a state, after the piece ``before``.
+def later(
+    scene: Scene,
+    before: Scene,
+    t: float,
+    state: State,
+    moved: Mapping[str, np.ndarray],
+    names: Collection[str],
+) -> Scene:
+    """Return the piece that begins at t (s) in a state, after the piece ``before``, in which the joints and
+    couplings of these names hold.
 
     ``moved`` has angle (rad, full turns counted) and displacement (m) since t = 0 of ``followed``.
     Raises SceneError if a joint does not meet a given pose.
@@ -98,11 +137,11 @@ def later(scene: Scene, before: Scene, t: float, state: State, moved: Mapping[st
     return scene.with_(
         duration=max(scene.duration - t, 1e-3 * scene.duration),
         body=[_moved(body, b, state) for b, body in enumerate(scene.body)],
-        joint=[_placed(scene, before, joint, t, state) for joint in scene.joint if holds(joint, t)],
+        joint=[_placed(scene, before, joint, t, state) for joint in scene.joint if joint.name in names],
         coupling=[
             from_coordinate(part, _led(scene, part, moved)).model_copy(update={**PERMANENT, "offset": 0.0})
             for part in scene.coupling
-            if holds(part, t)
+            if part.name in names
         ],
         driver=[driver.from_time(t) for driver in scene.driver],
         load=[found for load in scene.load for found in _load(scene, load, t, state, moved)],
@@ -111,9 +150,10 @@ def later(scene: Scene, before: Scene, t: float, state: State, moved: Mapping[st
 
 def followed(scene: Scene) -> list[str]:
     """Return the joints on whose coordinates since t = 0 a later piece depends: those with loads or end
-    stops, and the first ones of polynomial couplings."""
+    stops, the first ones of polynomial couplings, and those that conditions watch."""
     loaded = [load.joint for load in scene.load if isinstance(load, JointLoad)]
     loaded += [joint.name for joint in scene.joint if joint.end_stop]
+    loaded += [part.when.joint for part in parts_of(scene) if part.when and part.when.joint]
     return loaded + [coupling.joints[0] for coupling in scene.coupling if coupling.powers > 1]
 
 

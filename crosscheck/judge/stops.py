@@ -11,15 +11,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crosscheck.judge.constraints import joint_rates, scene_length
+from crosscheck.judge.constraints import jacobian, joint_rates, scene_length
 from crosscheck.judge.impacts import Impact, impact
-from crosscheck.judge.joint_coordinates import COORDINATES, coordinate_accelerations
+from crosscheck.judge.joint_coordinates import COORDINATES, coordinate_accelerations, coordinate_jacobian
 from crosscheck.judge.joint_residuals import grounded, joint_frames, with_ground
 from crosscheck.judge.pieces import State
+from crosscheck.judge.tolerances import RANK
 from mbref.scene import Driver, Scene
 
 TOUCHING = 1e-11  # gap (lengths of the mechanism, or rad) of a coordinate at its end
 STILL = 1e-12  # rate of a gap / largest velocity, which rounding may leave
+LOCKED = 1e-8  # part of a coordinate's unit row that other rows do not span, below which they lock it
 CHATTER = 1e-6  # flight between two impacts / end time, below which a coordinate stays at its end
 
 
@@ -87,6 +89,17 @@ def bounced(after: Scene, before: State, touching: Sequence[End], wanted: Mappin
         if not closing.any():
             return found
         rates |= {end: 0.0 for end, closes in zip(left, closing, strict=True) if closes}
+
+
+def is_locked(piece: Scene, joint: str, state: State, column: int) -> bool:
+    """Return whether the rows of a piece lock a joint's angle (column 0) or displacement (1) in a state."""
+    rows, _ = jacobian(piece, 0.0, state.position, state.orientation)
+    own = coordinate_jacobian(piece, joint, state.position, state.orientation)[column]
+    units = np.tile(np.repeat([1.0, 1 / scene_length(piece)], 3), len(piece.body))
+    rows, own = rows * units, own * units / np.linalg.norm(own * units)
+    rows = rows / np.linalg.norm(rows, axis=1)[:, None]
+    left = own - rows.T @ np.linalg.lstsq(rows.T, own, rcond=RANK)[0]
+    return bool(np.linalg.norm(left) < LOCKED)
 
 
 def hits(piece: Scene, touching: Sequence[End], before: State, contacts: Collection[str]) -> dict[End, float]:

@@ -16,7 +16,7 @@ from mbref.equations.initial_state import consistent_start, position_weights
 from mbref.equations.joint_reactions import least_reactions, open_dimensions
 from mbref.equations.model import Model
 from mbref.equations.units import row_lengths
-from mbref.scene import Scene, SceneError
+from mbref.scene import Driver, Scene, SceneError
 
 IMPACT_RANK = 1e-9  # singular value of unit rows / largest one, below which a row counts as redundant
 NO_VELOCITIES = 1e-8  # residual of unit rows / speed in the metric of M, above which no velocities obey them
@@ -61,6 +61,19 @@ def impact(before: Scene, after: Scene) -> Impact:
         {name: int(marks[name][0]) for name in wrenches},
         energy,
     )
+
+
+def is_locked(scene: Scene, joint: str) -> bool:
+    """Return whether the constraints of a scene lock the coordinate of a joint that a driver could prescribe,
+    at the scene's poses: its row is a combination of the other rows."""
+    model = Model(scene.with_(driver=[*scene.driver, Driver(joint=joint, polynomial=(0.0,))]))
+    root, rows = 1 / np.sqrt(position_weights(model)), model.terms(0.0, model.start()).jacobian
+    unit = rows * root / row_lengths(rows * root)[:, None]
+    own = model.structure.row[model.structure.driver == len(scene.driver)][0]
+    others = np.delete(unit, own, axis=0)
+    left = unit[own] - others.T @ np.linalg.lstsq(others.T, unit[own], rcond=IMPACT_RANK)[0]
+    model.release()
+    return bool(np.linalg.norm(left) < NO_VELOCITIES)
 
 
 def _least_change(model: Model, jacobian: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

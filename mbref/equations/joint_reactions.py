@@ -7,7 +7,7 @@ like a driver's row.
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -202,12 +202,22 @@ def determined_components(
     rows, added to the multipliers, changes the component.
     """
     found = {joint.name: np.ones((len(q), 6), dtype=bool) for joint in model.scene.joint}
+    for changes in open_changes(model, q, blocks, angles):
+        for name, change in changes.items():
+            found[name] &= np.abs(change) <= SHARE
+    return found
+
+
+def open_changes(
+    model: Model, q: np.ndarray, blocks: np.ndarray, angles: np.ndarray | None = None
+) -> Iterator[dict[str, np.ndarray]]:
+    """Yield by joint the changes (k, 6) of its reaction by each vanishing combination of unit rows, with
+    forces times the mechanism's length; arguments as for ``reactions``."""
     vanishing, lengths = vanishing_combinations(model, blocks)
     units = np.repeat([model.length, 1.0], 3)
     for k in range(vanishing.shape[-1]):
-        for name, change in reactions(model, q, blocks, vanishing[..., k] / lengths, angles).items():
-            found[name] &= np.abs(change * units) <= SHARE
-    return found
+        found = reactions(model, q, blocks, vanishing[..., k] / lengths, angles)
+        yield {name: change * units for name, change in found.items()}
 
 
 def vanishing_combinations(model: Model, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -81,10 +81,13 @@ def _events(joint: Joint, motion: Trajectory) -> tuple[np.ndarray | None, ...]:
     """Return where a joint constrains (k,), and the sums (k, 3) of its impulses; None without events."""
     if motion.events is None:
         return None, None, None
-    total = np.zeros((len(motion.times), 6))
+    total, holds = np.zeros((len(motion.times), 6)), np.full(len(motion.times), int(joint.starts_held))
     for event in motion.events:
-        total[motion.times >= event.time] += event.impulses.get(joint.name, np.zeros(6))
-    return np.array([int(joint.is_active(t)) for t in motion.times]), total[:, :3], total[:, 3:]
+        later = motion.times >= event.time
+        total[later] += event.impulses.get(joint.name, np.zeros(6))
+        if joint.name in (*event.engaged, *event.released):
+            holds[later] = joint.name in event.engaged
+    return holds, total[:, :3], total[:, 3:]
 
 
 def along(found: JointMotion, coordinate: Coordinate) -> tuple[np.ndarray, np.ndarray]:

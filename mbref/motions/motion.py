@@ -22,7 +22,7 @@ from mbref.motions.joint_motion import JointMotion, joint_motion
 from mbref.motions.maxima import ReactionMaxima, reaction_maxima
 from mbref.motions.output_units import in_units
 from mbref.motions.outputs import all_columns, chosen
-from mbref.motions.pieces import restarted
+from mbref.motions.restart_with_events import restarted
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 

@@ -1,13 +1,13 @@
-"""Pieces of a motion, between the times at which joints and couplings begin or cease to constrain.
+"""Pieces of a motion, between the events at which joints and couplings begin or cease to constrain.
 
 The scene of a piece has the constraints that hold in it, and starts at the poses of its first moment.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,35 +17,40 @@ from mbref.equations.model import Model, poses
 from mbref.input_error import InputError
 from mbref.motions.event import STATE_BEFORE, Event
 from mbref.motions.joint_motion import along, joint_motion, positions_of, turned_since_start
-from mbref.motions.restart import sample_at, scene_at
+from mbref.motions.restart import scene_at
 from mbref.motions.trajectory import PER_BODY, Trajectory
 from mbref.scene import Coupling, Driver, Joint, Scene, SceneError
 from mbref.scene.structure import intermittent
-
-if TYPE_CHECKING:
-    from mbref.scene.intervals import Intermittent
 
 POSE_MET = (
     1e-6  # gap (lengths of the mechanism, or rad) of a given pose that counts as met; the run leaves less
 )
 NEARLY_PARALLEL = 0.1  # sine of the angle of the axes of a universal joint, below which it cannot engage
-ALWAYS: dict[str, Any] = {"active": None, "engages": "anywhere"}
+ALWAYS: dict[str, Any] = {
+    **dict.fromkeys(("active", "when", "release", "holds_at_start")),
+    "engages": "anywhere",
+}
 
 
 def is_intermittent(scene: Scene) -> bool:
-    """Return whether a joint or a coupling has intervals, or a joint an end stop."""
+    """Return whether a joint or a coupling comes and goes, or a joint has an end stop."""
     return any(True for _ in intermittent(scene))
 
 
 def event_times(scene: Scene, end: float) -> list[float]:
-    """Return the times (s) after 0, up to an end, at which a constraint begins or ceases to hold."""
+    """Return the times (s) after 0, up to an end, at which an interval of a constraint begins or ends."""
     every = (interval for each in (*scene.joint, *scene.coupling) for interval in each.active or ())
     return sorted({time for interval in every for time in interval if 0.0 < time <= end})
 
 
 def first_piece(scene: Scene) -> Scene:
     """Return the scene with the constraints that hold at t = 0, without contacts."""
-    return scene.with_(**_holding(scene, 0.0))
+    return scene.with_(**_holding(scene, {each.name for each in constraint_parts(scene) if each.starts_held}))
+
+
+def constraint_parts(scene: Scene) -> tuple[Joint | Coupling, ...]:
+    """Return the joints and couplings of a scene."""
+    return (*scene.joint, *scene.coupling)
 
 
 def in_contact(piece: Scene, contacts: Sequence[str]) -> Scene:
@@ -54,10 +59,10 @@ def in_contact(piece: Scene, contacts: Sequence[str]) -> Scene:
     return piece.with_(driver=[*piece.driver, *held]) if held else piece
 
 
-def _holding(scene: Scene, t: float) -> dict[str, list[Any]]:
-    """Return the joints and couplings that hold from t (s) on, as in the file, without intervals."""
+def _holding(scene: Scene, names: Collection[str]) -> dict[str, list[Any]]:
+    """Return the joints and couplings with these names, as in the file, without intervals."""
     return {
-        key: [_permanent(each) for each in getattr(scene, key) if each.is_active(t)]
+        key: [_permanent(each) for each in getattr(scene, key) if each.name in names]
         for key in ("joint", "coupling")
     }
 
@@ -68,55 +73,60 @@ def _permanent(constraint: Any) -> Any:
     return constraint.model_copy(update={**ALWAYS, **stops})
 
 
-def changes(scene: Scene, t: float) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of the joints and couplings that begin, and that cease, to constrain at t (s)."""
+def changes(scene: Scene, piece: Scene, t: float) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names of the joints and couplings that begin, and that cease, to constrain by their
+    intervals at t (s), after a piece."""
     if t == 0.0:  # constraints that hold from the start do not begin
         return (), ()
-    every: tuple[Intermittent, ...] = (*scene.joint, *scene.coupling)
-    ends = [{interval[side] for interval in each.active or ()} for side in (0, 1) for each in every]
-    names = [each.name for each in (*scene.joint, *scene.coupling)]
-    begun, ceased = ends[: len(every)], ends[len(every) :]
-    return (
-        tuple(name for name, times in zip(names, begun, strict=True) if t in times),
-        tuple(name for name, times in zip(names, ceased, strict=True) if t in times),
-    )
+    held = {each.name for each in constraint_parts(piece)}
+    begun, ceased = [], []
+    for each in constraint_parts(scene):
+        begins, ends = zip(*each.active, strict=True) if each.active else ((), ())
+        if t in begins and not each.when and each.name not in held:
+            begun.append(each.name)
+        if t in ends and each.name in held:
+            ceased.append(each.name)
+    return tuple(begun), tuple(ceased)
 
 
-def next_piece(scene: Scene, piece: Scene, state: Trajectory, t: float) -> tuple[Scene, Scene]:
-    """Return two scenes that start at t (s): with the constraints and velocities before t, and with the
-    constraints from t on.
+def next_piece(
+    scene: Scene, piece: Scene, state: Trajectory, engaged: Sequence[str], released: Sequence[str]
+) -> tuple[Scene, Scene]:
+    """Return two scenes that start at the time t of a state: with the constraints and velocities before t,
+    and with the constraints from t on, of which some are ``engaged`` and others ``released`` then.
 
-    ``piece`` is the scene of the piece before, and ``state`` the state at t, with all turns since t = 0.
-    Raises SceneError if a constraint cannot engage there.
+    ``piece`` is the scene of the piece before, and ``state`` has all turns since t = 0. Raises SceneError if
+    a constraint cannot engage there.
     """
-    frame, placed = scene_at(_always(scene), state, t), scene_at(_bare(piece), state, t)
+    t = float(state.times[0])
+    frame, placed = scene_at(with_permanent(scene), state, t), scene_at(bare(piece), state, t)
     before = {joint.name: joint for joint in placed.joint}
-    engaged, _ = changes(scene, t)
-    holding = _holding(scene, t)
+    held = {each.name for each in constraint_parts(piece)} - {*released} | {*engaged}
+    holding = _holding(scene, held)
     joints = [
-        _engaged(scene, scene.joint_named(name), state, t) if name in engaged else before[name]
+        engaged_joint(scene, scene.joint_named(name), state, t) if name in engaged else before[name]
         for name in (joint.name for joint in holding["joint"])
     ]
     for coupling in scene.coupling:
         if coupling.name in engaged and coupling.engages == "given_pose":
             _refuse_coupling(scene, coupling, state, t)
-    couplings = [_from_state(scene, each, state, {"offset": 0.0}) for each in holding["coupling"]]
+    couplings = [coupling_from(scene, each, state, {"offset": 0.0}) for each in holding["coupling"]]
     old = frame.with_(joint=placed.joint, coupling=placed.coupling)
     return old, frame.with_(joint=joints, coupling=couplings)
 
 
-def _always(scene: Scene) -> Scene:
+def with_permanent(scene: Scene) -> Scene:
     """Return the scene with the joints that always hold only, on which drivers and loads act."""
-    held = [_permanent(joint) for joint in scene.joint if joint.active is None]
+    held = [_permanent(joint) for joint in scene.joint if joint.is_permanent]
     return scene.with_(joint=held, coupling=())
 
 
-def _bare(scene: Scene) -> Scene:
+def bare(scene: Scene) -> Scene:
     """Return the scene without loads and drivers."""
     return scene.with_(load=(), driver=())
 
 
-def _engaged(scene: Scene, joint: Joint, state: Trajectory, t: float) -> Joint:
+def engaged_joint(scene: Scene, joint: Joint, state: Trajectory, t: float) -> Joint:
     """Return a joint of the scene that begins to hold at the poses of t (s): its anchor and its axis are
     those that the first body carries, in the file."""
     if joint.engages == "given_pose":
@@ -166,13 +176,13 @@ def _refuse_gap(scene: Scene, joint: Joint, state: Trajectory, t: float) -> None
 
 def _refuse_coupling(scene: Scene, coupling: Coupling, state: Trajectory, t: float) -> None:
     """Raise SceneError if the coordinates of t (s) do not obey a coupling with its offset."""
-    if (gap := abs(_sum(scene, coupling, state) - coupling.offset)) > POSE_MET:
+    if (gap := abs(coupling_sum(scene, coupling, state) - coupling.offset)) > POSE_MET:
         raise cannot_hold(
             coupling.name, t, f"the sum of its coordinates misses the offset by {gap:.3g} m or rad"
         )
 
 
-def _sum(scene: Scene, coupling: Coupling, state: Trajectory) -> float:
+def coupling_sum(scene: Scene, coupling: Coupling, state: Trajectory) -> float:
     """Return the sum of the polynomials of a coupling's coordinates, m or rad, at a state."""
     ends = zip(scene.coupled(coupling), coupling.laws, strict=True)
     terms = (
@@ -182,7 +192,7 @@ def _sum(scene: Scene, coupling: Coupling, state: Trajectory) -> float:
     return float(sum(terms))
 
 
-def _from_state(scene: Scene, coupling: Coupling, state: Trajectory, fields: Mapping[str, Any]) -> Coupling:
+def coupling_from(scene: Scene, coupling: Coupling, state: Trajectory, fields: Mapping[str, Any]) -> Coupling:
     """Return a coupling whose coordinates count from a state, with changed fields."""
     joint, kind = scene.coupled(coupling)[0]
     moved = along(joint_motion(scene, state, joint.name), kind)[0][0] if coupling.powers > 1 else 0.0
@@ -191,7 +201,7 @@ def _from_state(scene: Scene, coupling: Coupling, state: Trajectory, fields: Map
 
 def cannot_hold(name: str, t: float, why: str) -> SceneError:
     """Return the error of a constraint that cannot begin to hold at t (s), with the reason."""
-    return SceneError([f"{name}.active: cannot begin to hold at t = {t:.6g} s: {why}"])
+    return SceneError([f"{name}: cannot begin to hold at t = {t:.6g} s: {why}"])
 
 
 def parts_of(scene: Scene, motion: Trajectory) -> Iterator[tuple[Scene, Trajectory]]:
@@ -212,57 +222,15 @@ def parts_of(scene: Scene, motion: Trajectory) -> Iterator[tuple[Scene, Trajecto
     for event in (*motion.events, None):
         end = np.inf if event is None else event.time
         chosen = (motion.times >= begin) & (motion.times < end)
-        yield in_contact(piece, contacts), _samples(motion, chosen, begin, turned)
+        yield in_contact(piece, contacts), samples_of(motion, chosen, begin, turned)
         if event is not None:
-            _, piece = next_piece(bare, piece, state_at(motion, event), event.time)
+            _, piece = next_piece(bare, piece, state_at(motion, event), event.engaged, event.released)
             begin, turned, contacts = event.time, dict(event.angles), event.contacts
 
 
-def restarted(scene: Scene, motion: Trajectory, t: float) -> Scene:
-    """Return ``scene_at``, also for constraints with intervals, which then count from t (s).
-
-    Raises InputError for a joint that engages later, and needs the poses of the first scene: it has to meet
-    a given pose, or has axes on both bodies.
-    """
-    if not is_intermittent(scene):
-        return scene_at(scene, motion, t)
-    k = sample_at(motion, t)
-    frame, at = scene_at(_always(scene), motion, t), float(motion.times[k])
-    pieces = [(piece, part.times) for piece, part in parts_of(scene, motion)]
-    piece = pieces[sum(event.time <= at for event in motion.events or ())][0]
-    placed = {joint.name: joint for joint in scene_at(_bare(piece), motion, t).joint}
-    state = _samples(motion, np.arange(len(motion.times)) == k, 0.0, {})
-    joints, couplings = [], []
-    for joint in scene.joint:
-        later: dict[str, Any] = _from_time(joint, at)
-        if joint.end_stop and joint.facts.driven:
-            moved = along(joint_motion(scene, state, joint.name), joint.facts.driven)[0][0]
-            later["stop"] = joint.end_stop.from_place(float(moved))
-        if joint.name in placed:
-            joints.append(placed[joint.name].model_copy(update={**later, "engages": joint.engages}))
-        elif later["active"]:
-            if joint.engages == "given_pose" or len(joint.directions) > 1:
-                raise InputError(
-                    f"scene_at: joint {joint.name!r} engages later by geometry of the first scene"
-                )
-            joints.append(_engaged(scene, joint, state, at).model_copy(update=later))
-    for coupling in scene.coupling:
-        later = _from_time(coupling, at)
-        holds = coupling.is_active(at)
-        offset = 0.0 if holds else coupling.offset - _sum(scene, coupling, state)
-        if holds or later["active"]:
-            couplings.append(_from_state(scene, coupling, state, {**later, "offset": offset}))
-    return frame.with_(joint=joints, coupling=couplings)
-
-
-def _from_time(constraint: Intermittent, t: float) -> dict[str, Any]:
-    """Return the intervals of a constraint that end after t (s), as times since t."""
-    if constraint.active is None:
-        return {"active": None}
-    return {"active": tuple((max(begin - t, 0.0), end - t) for begin, end in constraint.active if end > t)}
-
-
-def _samples(motion: Trajectory, chosen: np.ndarray, begin: float, turned: Mapping[str, float]) -> Trajectory:
+def samples_of(
+    motion: Trajectory, chosen: np.ndarray, begin: float, turned: Mapping[str, float]
+) -> Trajectory:
     """Return the chosen (k,) samples, with times (s) and angles (rad) from the begin of a piece."""
 
     def part(values: Any) -> Any:

@@ -10,6 +10,7 @@ of the faulty value.
 from __future__ import annotations
 
 from mbref.scene.bodies import Body, Driver
+from mbref.scene.conditions import Release, When
 from mbref.scene.couplings import Coupling
 from mbref.scene.functions import Factor, Sine, TimeFunction
 from mbref.scene.joints import (
@@ -63,6 +64,7 @@ __all__ = [
     "Load",
     "Moment",
     "Planar",
+    "Release",
     "Revolute",
     "Scene",
     "SceneError",
@@ -74,6 +76,7 @@ __all__ = [
     "TorsionSpring",
     "Translational",
     "Universal",
+    "When",
     "intermittent",
     "refuse_intervals",
 ]

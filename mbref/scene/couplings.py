@@ -111,5 +111,5 @@ def default_coordinates(names: Sequence[str], facts: Sequence[JointFacts]) -> tu
         if list(names).count(name) > 1:
             found.append(DISPLACEMENT if name in names[:k] else ANGLE)
         else:
-            found.append(each.driven or (*each.coordinates, ANGLE)[0])
+            found.append(each.main)
     return tuple(found)

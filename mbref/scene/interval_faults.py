@@ -1,15 +1,17 @@
-"""Faults of constraints with intervals, and of end stops: drivers, loads, couplings, armatures and stops need
-joints that always hold."""
+"""Faults of constraints that come and go, and of end stops: drivers, loads, couplings, armatures, stops and
+conditions need joints that always hold."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from mbref.scene.fields import field_of
 from mbref.scene.function_faults import QUANTITY_OF, Faults, listed
 from mbref.scene.joints import JOINT_TYPES
 from mbref.scene.units import fits
+
+COMES_AND_GOES = {"active": "intervals", "when": "a condition", "release": "a release"}  # field → its meaning
 
 
 def _text(entry: Any, key: str) -> str:
@@ -33,23 +35,79 @@ def _stop_faults(data: Mapping[str, Any], joints: list[Any]) -> Faults:
                 yield f"joint[{i}].stop.{end}", f"is of the {coordinate} of a {kind} joint, got {value!r}"
 
 
+def _sometimes(entry: Any, fields: Iterable[str] = COMES_AND_GOES) -> bool:
+    """Return whether a raw joint or coupling has intervals or conditions."""
+    return any(field_of(entry, field) is not None for field in fields)
+
+
 def interval_faults(data: Mapping[str, Any]) -> Faults:
-    """Yield the entries that need a joint that always holds, and a way to engage without intervals."""
+    """Yield the entries that need a joint that always holds, and fields that need intervals or conditions."""
     joints = listed(data.get("joint", ()))
-    sometimes = {_text(joint, "name") for joint in joints if field_of(joint, "active") is not None}
+    passing = {_text(joint, "name") for joint in joints if _sometimes(joint)}
     for key in ("joint", "coupling"):
         for i, entry in enumerate(listed(data.get(key, ()))):
-            if field_of(entry, "active") is None and field_of(entry, "engages") not in (None, "anywhere"):
-                yield f"{key}[{i}].engages", "is of a constraint with intervals; give active, too"
+            if not _sometimes(entry):
+                if field_of(entry, "engages") not in (None, "anywhere"):
+                    yield f"{key}[{i}].engages", "is of a constraint with intervals; give active or when, too"
+                if field_of(entry, "holds_at_start") is not None:
+                    yield f"{key}[{i}].holds_at_start", "is of a constraint with active, when or release"
+            elif field_of(entry, "holds_at_start") is False and not _sometimes(entry, ("active", "when")):
+                yield f"{key}[{i}].holds_at_start", "lets it never hold; give active or when, too"
     for i, joint in enumerate(joints):
-        if field_of(joint, "active") is not None and field_of(joint, "armature"):
-            yield f"joint[{i}].armature", "needs a joint that always holds, and this one has intervals"
-        if field_of(joint, "active") is not None and field_of(joint, "stop"):
-            yield f"joint[{i}].stop", "needs a joint that always holds, and this one has intervals"
+        for field in ("armature", "stop"):
+            has = [COMES_AND_GOES[each] for each in COMES_AND_GOES if field_of(joint, each) is not None]
+            if has and field_of(joint, field):
+                yield f"joint[{i}].{field}", f"needs a joint that always holds, and this one has {has[0]}"
     yield from _stop_faults(data, joints)
+    for path, given in _users(data):
+        for name in listed(given) or [given]:
+            if isinstance(name, str) and name in passing:
+                yield path, f"needs a joint that always holds; {name!r} has intervals or conditions"
+
+
+def _users(data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the path and the names of the joints on whose coordinates an entry acts."""
     for key, field in (("coupling", "joints"), ("driver", "joint"), ("load", "joint")):
         for i, entry in enumerate(listed(data.get(key, ()))):
-            given = field_of(entry, field)
-            for name in listed(given) or [given]:
-                if isinstance(name, str) and name in sometimes:
-                    yield f"{key}[{i}].{field}", f"needs a joint that always holds; {name!r} has intervals"
+            yield f"{key}[{i}].{field}", field_of(entry, field)
+    for key in ("joint", "coupling"):
+        for i, entry in enumerate(listed(data.get(key, ()))):
+            yield f"{key}[{i}].when.joint", field_of(field_of(entry, "when"), "joint")
+
+
+def condition_faults(path: str, entry: Any, types: Mapping[str, str]) -> Faults:
+    """Yield contradicting or missing fields of ``when`` and ``release``, of joints with these types."""
+    when, release = field_of(entry, "when"), field_of(entry, "release")
+    name, ends = field_of(when, "joint"), [field_of(when, key) is not None for key in ("bodies", "points")]
+    if when is not None:
+        if (name is not None) == any(ends):
+            yield f"{path}.when", "needs a joint, or bodies and points" + "; give one of them" * any(ends)
+        elif any(ends) and not all(ends):
+            yield f"{path}.when.{'points' if ends[0] else 'bodies'}", "is required for a distance of points"
+        else:
+            yield from _watched_faults(f"{path}.when", when, types)
+    if release is not None:
+        given = [field_of(release, key) is not None for key in ("force", "moment")]
+        if sum(given) != 1:
+            yield f"{path}.release", "needs a force or a moment" + ", not both" * all(given)
+        if path.startswith("coupling") and field_of(release, "joint") is None:
+            yield f"{path}.release.joint", "is required, a joint whose reaction releases the coupling"
+
+
+def _watched_faults(path: str, when: Any, types: Mapping[str, str]) -> Faults:
+    """Yield a coordinate that the joint lacks, and a value in another unit than the coordinate's."""
+    name, coordinate, reaches = (field_of(when, key) for key in ("joint", "coordinate", "reaches"))
+    if name is None:
+        if coordinate is not None:
+            yield f"{path}.coordinate", "is of a joint, and the distance of two points has no other"
+        if not fits(reaches, "length"):
+            yield f"{path}.reaches", f"is a distance, got {reaches!r}"
+        return
+    kind = types.get(name) if isinstance(name, str) else None
+    if kind not in JOINT_TYPES or not (known := JOINT_TYPES[kind].facts.coordinates):
+        return  # reported as a fault of the joint's name
+    chosen = coordinate or JOINT_TYPES[kind].facts.main
+    if chosen in QUANTITY_OF and chosen not in known:
+        yield f"{path}.coordinate", f"{name!r} is {kind}, which has no {chosen}"
+    elif chosen in QUANTITY_OF and not fits(reaches, QUANTITY_OF[chosen]):
+        yield f"{path}.reaches", f"is of the {chosen} of {name!r}, got {reaches!r}"

@@ -1,4 +1,4 @@
-"""Intervals of time in which a joint or a coupling constrains the motion."""
+"""Intervals of time, and conditions, in which a joint or a coupling constrains the motion."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from itertools import pairwise
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator
 
+from mbref.scene.conditions import Release, When
 from mbref.scene.fields import SceneEntry, Time, as_list
 
+LOCATED = 1e-14  # difference of times / longest time, by rounding of a time that is found as a zero
 EVEN_ROUNDING = 1e-15  # difference of times / time, by rounding of evenly spaced samples: a few units
 Engagement = Literal["anywhere", "given_pose"]
 
@@ -33,16 +35,41 @@ Intervals = Annotated[
 class Intermittent(SceneEntry):
     """Fields of a constraint that may come and go.
 
-    ``active`` are intervals [begin, end) of time, s; without them the constraint always holds.  Where it
-    begins after t = 0 it holds the relative pose of that moment (``engages = "anywhere"``), or the bodies
-    have to be at a relative pose that the file allows (``"given_pose"``).
+    ``active`` are intervals [begin, end) of time, s, outside of which it never holds. It begins to hold
+    where an interval begins, or with ``when`` where a coordinate reaches a value. A reaction ends it by
+    ``release``. Where it begins after t = 0 it holds the relative pose of that moment (``engages =
+    "anywhere"``), or the bodies have to be at a relative pose that the file allows (``"given_pose"``).
+    ``holds_at_start`` states whether it holds at t = 0; the default is to hold, without ``when``.
     """
 
     active: Intervals | None = None
+    when: When | None = None
+    release: Release | None = None
+    holds_at_start: bool | None = None
     engages: Engagement = "anywhere"
 
+    @field_validator("holds_at_start")
+    @classmethod
+    def _is_in_an_interval(cls, holds: bool | None, info: ValidationInfo) -> bool | None:
+        active = info.data.get("active")
+        if holds and active and active[0][0] > 0.0:
+            raise ValueError(f"needs an interval from t = 0 on; the first one begins at {active[0][0]:g} s")
+        return holds
+
+    @property
+    def is_permanent(self) -> bool:
+        """Return whether the constraint always holds."""
+        return self.active is None and self.when is None and self.release is None
+
+    @property
+    def starts_held(self) -> bool:
+        """Return whether the constraint holds at t = 0."""
+        if self.holds_at_start is not None:
+            return self.holds_at_start or self.is_permanent
+        return self.when is None and self.is_active(0.0)
+
     def is_active(self, t: float) -> bool:
-        """Return whether the constraint holds from t (s) on."""
+        """Return whether the constraint may hold from t (s) on, by its intervals."""
         return self.active is None or any(begin <= t < end for begin, end in self.active)
 
 
@@ -57,3 +84,9 @@ def samples_at(times: np.ndarray, events: Sequence[float]) -> np.ndarray:
         if abs(times[nearest] - event) <= EVEN_ROUNDING * event:
             found[nearest] = event
     return found
+
+
+def at_sample(times: np.ndarray, event: float) -> float:
+    """Return the time (s) of an event that was found as a zero; a sample time, if it differs by rounding."""
+    nearest = float(times[np.abs(times - event).argmin()])
+    return nearest if abs(nearest - event) <= LOCATED * float(times[-1]) else event

@@ -77,6 +77,11 @@ class JointFacts:
         angle = (ANGLE,) if self.turns else ()
         return angle + ((DISPLACEMENT,) if self.forbidden_translations == (X, Y) else ())
 
+    @property
+    def main(self) -> Coordinate:
+        """Coordinate that is meant where none is named; the angle where there is no coordinate."""
+        return self.driven or (*self.coordinates, ANGLE)[0]
+
 
 class JointEntry(Intermittent):
     """Fields and facts that all joints have."""

@@ -10,12 +10,14 @@ from pydantic import Field, ValidationError, model_validator
 
 from mbref.files import write
 from mbref.scene.bodies import Body, Driver
+from mbref.scene.conditions import Release, When
 from mbref.scene.couplings import Coupling
 from mbref.scene.fields import Acceleration, EntryType, LaterTime, Name, SceneEntry, Three
 from mbref.scene.functions import Factor, Sine
 from mbref.scene.joints import Coordinate, Joint
 from mbref.scene.loads import Load
 from mbref.scene.paths import replaced_at
+from mbref.scene.stops import Stop
 from mbref.scene.toml import as_lists, read_toml, scene_text, with_lines
 from mbref.scene.validation import GROUND, SceneError, field_faults, named_paths, reference_faults
 
@@ -218,7 +220,8 @@ class Scene(SceneEntry):
 
 
 FIELDS_OF_TABLES = {"": tuple(Scene.model_fields)} | {
-    table.__name__.lower(): tuple(table.model_fields) for table in (Body, Coupling, Driver, Sine, Factor)
+    table.__name__.lower(): tuple(table.model_fields)
+    for table in (Body, Coupling, Driver, Sine, Factor, When, Release, Stop)
 }
 
 

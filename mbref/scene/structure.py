@@ -9,6 +9,7 @@ import numpy as np
 
 from mbref.rotations import Vector3
 from mbref.scene.fields import COINCIDENT
+from mbref.scene.interval_faults import COMES_AND_GOES
 from mbref.scene.loads import Spring
 from mbref.scene.validation import GROUND, SceneError
 
@@ -19,19 +20,20 @@ SAME_DIRECTION = 1e-12  # 1 - cosine of the angle of axes that count as parallel
 
 
 def intermittent(scene: Scene) -> Iterator[str]:
-    """Yield the path of each joint and coupling that has intervals, such as ``joint[latch].active``, and of
-    each end stop."""
-    yield from (f"joint[{joint.name}].active" for joint in scene.joint if joint.active is not None)
-    yield from (f"coupling[{each.name}].active" for each in scene.coupling if each.active is not None)
+    """Yield the path of each field by which a joint or coupling comes and goes, such as
+    ``joint[latch].active``, and of each end stop."""
+    for key, entries in (("joint", scene.joint), ("coupling", scene.coupling)):
+        for each in entries:
+            given = [field for field in COMES_AND_GOES if getattr(each, field) is not None]
+            yield from (f"{key}[{each.name}].{field}" for field in given)
     yield from (f"joint[{joint.name}].stop" for joint in scene.joint if joint.end_stop)
 
 
 def refuse_intervals(scene: Scene) -> None:
     """Raise SceneError for the first constraint with intervals, where only one set of constraints can be."""
     for path in intermittent(scene):
-        raise SceneError(
-            [f"{path}: only motions have intervals and stops (mbref run, plot, animate); remove them here"]
-        )
+        why = "only motions have intervals, conditions and stops (mbref run, plot, animate)"
+        raise SceneError([f"{path}: {why}; remove them here"])
 
 
 def has_massless(scene: Scene) -> bool:

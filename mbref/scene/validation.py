@@ -14,7 +14,7 @@ from mbref.printable import printable
 from mbref.scene.coupling_faults import coordinate_faults, count_faults
 from mbref.scene.fields import checked_length, checked_size, field_of, is_some, meant, shown
 from mbref.scene.function_faults import Faults, factor_faults, listed, table_faults, unit_faults
-from mbref.scene.interval_faults import interval_faults
+from mbref.scene.interval_faults import condition_faults, interval_faults
 from mbref.scene.joints import JOINT_TYPES
 from mbref.scene.loads import LOAD_TYPES, JointLoad
 from mbref.scene.shapes import SHAPE_TYPES
@@ -204,6 +204,7 @@ def reference_faults(data: Mapping[str, Any]) -> Faults:
     yield from _coupling_faults(data, types)
     yield from _driver_faults(data, types)
     yield from interval_faults(data)
+    yield from _condition_faults(data, types, known)
     for i, load in enumerate(_entries(data, "load")):
         acts_on = ACTS_ON.get(_text(load, "type"))
         if acts_on == "body":
@@ -259,6 +260,20 @@ def _coupling_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Fault
             yield from coordinate_faults(f"coupling[{i}]", coupling, names, types)
         else:
             yield from count_faults(f"coupling[{i}]", coupling, len(names))
+
+
+def _condition_faults(data: Mapping[str, Any], types: Mapping[str, Any], known: set[str]) -> Faults:
+    """Yield faults of the conditions of joints and couplings, with unknown joints and bodies."""
+    for key in ("joint", "coupling"):
+        for i, entry in enumerate(_entries(data, key)):
+            path, when = f"{key}[{i}]", field_of(entry, "when")
+            yield from _joint_faults(
+                f"{path}.when.joint", field_of(when, "joint"), types, COUPLED, "be watched"
+            )
+            yield from _pair_faults(f"{path}.when.bodies", field_of(when, "bodies"), known)
+            other = field_of(field_of(entry, "release"), "joint")
+            yield from _joint_faults(f"{path}.release.joint", other, types, tuple(JOINT_TYPES), "release")
+            yield from condition_faults(path, entry, types)
 
 
 def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:

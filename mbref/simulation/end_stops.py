@@ -7,21 +7,21 @@ held there by a row while the force of this row pushes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from mbref.equations.impacts import Impact, impact
+from mbref.equations.impacts import Impact, impact, is_locked
 from mbref.motions.driving_forces import coordinate_acceleration
 from mbref.motions.joint_motion import along, joint_motion
 from mbref.motions.motion import Motion
-from mbref.motions.pieces import in_contact
+from mbref.motions.pieces import constraint_parts, in_contact
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Driver, Scene, SceneError
 from mbref.scene.joints import DISPLACEMENT, Coordinate
-from mbref.simulation.zeros import PULL, Signal, first_zero
+from mbref.simulation.zeros import PULL, Signal
 
 GAP_CLOSED = 1e-12  # gap (lengths of the mechanism, or rad) of a coordinate at its end
 GAP_ROUNDED = 1e-14  # gap (lengths, or rad) that rounding may leave in a motion
@@ -69,29 +69,33 @@ class EndStops:
         self.scene, self._run, self._end = scene, run, end
         self.sides = [*_sides(scene)]
         points = np.array([body.position for body in scene.body] + [j.anchor_pair[0] for j in scene.joint])
-        self._length = float(np.ptp(points, axis=0).max(initial=0.0)) or 1.0
+        self.length = float(np.ptp(points, axis=0).max(initial=0.0)) or 1.0
 
     def _least(self, side: Side) -> float:
-        return GAP_CLOSED * (self._length if side.coordinate == DISPLACEMENT else 1.0)
+        return GAP_CLOSED * (self.length if side.coordinate == DISPLACEMENT else 1.0)
 
-    def first_event(
-        self, piece: Scene, contacts: Sequence[str], turned: Mapping[str, float], end: float
-    ) -> float | None:
-        """Return the time (s) in a piece at which a stop is met or a contact would pull; None without one."""
-        held = in_contact(piece, contacts)
-        signals = []
+    def signals(
+        self, piece: Scene, contacts: Sequence[str], turned: Mapping[str, float]
+    ) -> Iterator[tuple[str, Signal]]:
+        """Yield a signal for each stop of a piece that can be met, and for each contact, with its name."""
+        free = self._free(piece, self.sides)
         for side in self.sides:
             if side.name in contacts:
-                signals.append(Signal(side.push))
-            elif side.joint not in {name.rpartition(".")[0] for name in contacts}:
+                yield side.name, Signal(side.push)
+            elif side in free and side.joint not in {name.rpartition(".")[0] for name in contacts}:
                 value, rate = (self._part(side, turned, k) for k in (0, 1))
-                signals.append(Signal(value, rate, GAP_ROUNDED / GAP_CLOSED * self._least(side)))
-        if not signals:
-            return None
-        return first_zero(lambda times: self._run(held, times), signals, end, *laws(piece))
+                yield side.name, Signal(value, rate, GAP_ROUNDED / GAP_CLOSED * self._least(side))
+
+    def _free(self, piece: Scene, sides: Sequence[Side]) -> list[Side]:
+        """Return the sides of coordinates that a piece does not lock; constraints that always hold lock
+        none."""
+        if all(each.is_permanent for each in constraint_parts(self.scene)):
+            return [*sides]
+        locked = {name for name in {side.joint for side in sides} if is_locked(piece, name)}
+        return [side for side in sides if side.joint not in locked]
 
     def _part(self, side: Side, turned: Mapping[str, float], part: int) -> Callable[[Motion], np.ndarray]:
-        return lambda motion: side.gap(self.scene, _counted(motion, turned))[part]
+        return lambda motion: side.gap(self.scene, counted(motion, turned))[part]
 
     def touching(self, state: Trajectory) -> list[Side]:
         """Return the sides at which the gaps of a state are closed."""
@@ -110,7 +114,7 @@ class EndStops:
 
         ``before`` and ``after`` are the scenes of both pieces, at the poses of the state.
         """
-        touching = self.touching(state)
+        touching = self._free(after, self.touching(state))
         rates = {side: float(side.gap(self.scene, state)[1][0]) for side in touching}
         speeds = (float(np.abs(x).max()) for x in (state.velocity, state.angular_velocity))
         still = AT_REST_RATE * max(1e-300, *speeds)
@@ -196,7 +200,7 @@ def laws(scene: Scene) -> tuple[list[float], float]:
     return sorted(knots - {0.0}), max(map(abs, sines), default=0.0)
 
 
-def _counted(motion: Trajectory, turned: Mapping[str, float]) -> Trajectory:
+def counted(motion: Trajectory, turned: Mapping[str, float]) -> Trajectory:
     """Return the motion of a piece with angles since t = 0, from the angles (rad) at its begin."""
     angles = {name: each + turned.get(name, 0.0) for name, each in (motion.angles or {}).items()}
     return replace(motion, angles=angles)

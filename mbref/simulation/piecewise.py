@@ -1,9 +1,12 @@
 """Motions with joints and couplings that come and go, or with end stops: one run for each piece between
-events, and the impacts between them."""
+events, and the impacts between them.
+
+Intervals give times of events. Stops and conditions give signals of a piece, whose first zero is an event.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -14,16 +17,26 @@ from mbref.input_error import InputError
 from mbref.motions.crossing import Crossing
 from mbref.motions.event import STATE_BEFORE, Event
 from mbref.motions.motion import Motion
-from mbref.motions.pieces import cannot_hold, changes, event_times, first_piece, in_contact, next_piece
+from mbref.motions.pieces import (
+    cannot_hold,
+    changes,
+    constraint_parts,
+    event_times,
+    first_piece,
+    in_contact,
+    next_piece,
+)
 from mbref.motions.trajectory import PER_BODY, Cost, Outcome, Trajectory
 from mbref.scene import Joint, Scene, SceneError
 from mbref.scene.bodies import DRIVER
-from mbref.scene.intervals import samples_at
-from mbref.simulation.end_stops import EndStops, with_impact
+from mbref.scene.intervals import at_sample, samples_at
+from mbref.simulation.conditions import Conditions
+from mbref.simulation.end_stops import EndStops, laws, with_impact
+from mbref.simulation.zeros import first_zero
 from mbref.stepping.limits import Limits
 from mbref.stepping.run import missing_masses
 
-MOST_EVENTS = 1000  # events of a scene with end stops, at which a run ends
+MOST_EVENTS = 1000  # events of a scene with end stops or conditions, at which a run ends
 Reached = Callable[[float], None] | None
 RunOfPiece = Callable[[Scene, np.ndarray, Reached], Motion]  # of a scene, at times (k,), s
 
@@ -46,12 +59,12 @@ def simulate_pieces(
     branches, whose numbers count the singular positions of one piece.
     """
     if limits.branches:
-        raise InputError("branches: cannot be chosen in a scene with intervals or end stops")
+        raise InputError("branches: cannot be chosen in a scene with intervals, conditions or stops")
     if not scene.has_mass():
         raise SceneError(missing_masses(scene))
     times = samples_at(times, event_times(scene, np.inf))
-    stops = EndStops(scene, lambda scene, times: run(scene, times, None), float(times[-1]))
-    begin, ends = 0.0, event_times(scene, float(times[-1]))
+    watch = _Watch(scene, lambda scene, times: run(scene, times, None), float(times[-1]))
+    begin, ends, stops = 0.0, event_times(scene, float(times[-1])), watch.stops
     piece, pieces, events, turned = first_piece(scene), [], [], dict[str, float]()
     contacts: tuple[str, ...] = ()
     if stops.sides and stops.starts(start := run(piece, np.zeros(1), None)):
@@ -61,8 +74,8 @@ def simulate_pieces(
     while True:
         end = next((time for time in ends if time > begin), None)
         last = float(times[-1]) if end is None else end
-        met = stops.first_event(piece, contacts, turned, last - begin)
-        end = end if met is None else begin + met
+        met, names = watch.first_event(piece, contacts, turned, begin, last - begin)
+        end = end if met is None else at_sample(times, begin + met)
         own = times[(times >= begin) & (times < end)] if end is not None else times[times >= begin]
         local = own - begin if end is None else np.append(own - begin, end - begin)
         motion = run(
@@ -73,15 +86,48 @@ def simulate_pieces(
             break
         state = _end(motion, end, turned)
         turned = {name: float(angles[0]) for name, angles in (state.angles or {}).items()}
-        piece, event = _event(scene, piece, contacts, state, turned, stops)
+        piece, event = _event(scene, piece, contacts, state, turned, stops, names)
         contacts, begin = event.contacts, end
         events.append(event)
-        if stops.sides and len(events) >= MOST_EVENTS:
-            why = f"{MOST_EVENTS} events at end stops were met up to t = {end:.6g} s"
-            failed = replace(motion, outcome=Outcome.STEP_FAILED, message=why)
-            pieces[-1] = replace(pieces[-1], motion=failed)
+        if watch.is_needed and len(events) >= MOST_EVENTS:
+            pieces[-1] = replace(pieces[-1], motion=_too_many(motion, events))
             break
     return _joined(scene, times, pieces, events)
+
+
+class _Watch:
+    """The stops and conditions of a scene, whose signals are followed together."""
+
+    def __init__(self, scene: Scene, run: Callable[[Scene, np.ndarray], Motion], end: float):
+        self._run = run
+        self.stops = EndStops(scene, run, end)
+        self.conditions = Conditions(scene, run, end, self.stops.length)
+        every = constraint_parts(scene)
+        self.is_needed = bool(self.stops.sides) or any(each.when or each.release for each in every)
+
+    def first_event(
+        self, piece: Scene, contacts: Sequence[str], turned: Mapping[str, float], begin: float, left: float
+    ) -> tuple[float | None, tuple[str, ...]]:
+        """Return the time (s) in a piece that begins at a time (s) at which a stop is met, a contact would
+        pull or a condition is met, and the names of these stops and constraints; no time without one."""
+        held = in_contact(piece, contacts)
+        if released := self.conditions.exceeded(piece, held):
+            return 0.0, released
+        named = [*self.stops.signals(piece, contacts, turned)]
+        named += self.conditions.signals(piece, held, turned, begin, left)
+        signals = [signal for _, signal in named]
+        found = named and first_zero(lambda times: self._run(held, times), signals, left, *laws(piece))
+        if not found:
+            return None, ()
+        return found.time, tuple(named[k][0] for k in found.signals)
+
+
+def _too_many(motion: Motion, events: Sequence[Event]) -> Motion:
+    """Return the last piece of a run that ends because of too many events."""
+    last = events[-1]
+    names = ", ".join(dict.fromkeys((*last.engaged, *last.released, *last.stops))) or "end stops"
+    why = f"{MOST_EVENTS} events at end stops or of conditions were met up to t = {last.time:.6g} s"
+    return replace(motion, outcome=Outcome.STEP_FAILED, message=f"{why}, the last one of {names}")
 
 
 def _later(progress: Reached, begin: float) -> Reached:
@@ -105,14 +151,20 @@ def _event(
     state: Trajectory,
     turned: Mapping[str, float],
     stops: EndStops,
+    met_by: Collection[str] = (),
 ) -> tuple[Scene, Event]:
     """Return the scene after an event, with its velocities and without contacts, and the event.
 
-    ``piece`` is the scene before it, with these contacts.
+    ``piece`` is the scene before it, with these contacts; ``met_by`` are the constraints whose conditions are
+    met.
     """
     t = float(state.times[0])
-    before, after = next_piece(scene, piece, state, t)
-    engaged, released = changes(scene, t)
+    engaged, released = changes(scene, piece, t)
+    held = {each.name for each in constraint_parts(piece)}
+    met_by = [each.name for each in constraint_parts(scene) if each.name in met_by]
+    engaged += tuple(name for name in met_by if name not in held)
+    released += tuple(name for name in met_by if name in held and name not in released)
+    before, after = next_piece(scene, piece, state, engaged, released)
     try:
         met = stops.meet(in_contact(before, contacts), after, state, contacts)
     except SceneError as fault:
@@ -210,7 +262,7 @@ def _over_pieces(
 
 def _is_counted(joint: Joint) -> bool:
     """Return whether the turns of a joint are counted: it always holds and turns about one axis."""
-    return joint.active is None and joint.facts.turns
+    return joint.is_permanent and joint.facts.turns
 
 
 def _angles(scene: Scene, pieces: Sequence[_Piece]) -> dict[str, np.ndarray]:

@@ -24,13 +24,14 @@ SHARPER = 0.25  # of such a window
 LEAST_WINDOW = 1e-12  # window / longest time, below which a signal does not leave zero
 PULL = 1e-10  # force / largest force of a window that rounding may leave
 MOST_ROOT_STEPS = 8  # steps of Newton's method; four reach rounding
+SAME_ZERO = 1e-13  # difference of times / longest time, by rounding, of signals that fall below zero at once
 FROM_ZERO = -1.0  # a signal that starts at zero is negative at the next sample
 
 
 class Signal(NamedTuple):
     """A number of a motion that is positive until an event: values and rates (k,); forces have no rate.
 
-    Values of at least ``-least`` count as zero; for forces the limit is relative to the largest one.
+    Values of at least ``-least`` count as zero; forces also to PULL times the largest one.
     """
 
     value: Callable[[Motion], np.ndarray]
@@ -39,7 +40,14 @@ class Signal(NamedTuple):
 
     def floor(self, value: np.ndarray) -> float:
         """Return the size that rounding may give to values (k,) that are zero."""
-        return self.least if self.rate else PULL * float(np.abs(value).max(initial=0.0))
+        return self.least if self.rate else max(self.least, PULL * float(np.abs(value).max(initial=0.0)))
+
+
+class Zero(NamedTuple):
+    """A time (s) at which signals fall below zero, and their numbers."""
+
+    time: float
+    signals: tuple[int, ...]
 
 
 def first_zero(
@@ -48,8 +56,8 @@ def first_zero(
     end: float,
     knots: Sequence[float] = (),
     frequency: float = 0.0,
-) -> float | None:
-    """Return the first time (s), up to an end, at which a signal falls below zero; None without one, or if
+) -> Zero | None:
+    """Return the first time (s), up to an end, at which signals fall below zero; None without one, or if
     the motion ends before. ``run`` returns the motion at increasing times (k,). At ``knots`` (s) functions
     of time change their law; ``frequency`` (rad/s) is the largest one of their sines."""
     begin, window = 0.0, end
@@ -70,10 +78,12 @@ def first_zero(
         zeros = [time for time in found if time is not None]
         if FROM_ZERO in zeros:
             if window <= LEAST_WINDOW * end:
-                return 0.0
+                return Zero(0.0, tuple(k for k, time in enumerate(found) if time == FROM_ZERO))
             window /= GRID
         elif zeros:
-            return min(zeros)
+            last = min(zeros) + SAME_ZERO * end
+            together = (k for k, time in enumerate(found) if time is not None and time <= last)
+            return Zero(min(zeros), tuple(together))
         elif len(motion.times) < len(times):
             return None
         else:

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+import mbref
 from crosscheck.conformance.mechanisms.geared import geared_mechanism
 from crosscheck.conformance.mechanisms.random_scenes import mechanism
 from mbref.scene import Scene
@@ -69,3 +70,30 @@ def _intervals(rng: np.random.Generator) -> dict[str, Any]:
     """Return one or two intervals between some of CHANGES, the start and a time after the end."""
     times = sorted(rng.choice([0.0, *CHANGES, 1.0], 2 if rng.random() < 0.6 else 4, replace=False).tolist())
     return {"active": tuple(zip(times[::2], times[1::2], strict=True))}
+
+
+def conditional_mechanism(seed: int) -> Scene:
+    """Return a random mechanism: a joint begins to hold where the coordinate of another joint has been at
+    0.1 s, and a joint without redundancy breaks by its force of 0.05 s. It depends on the seed only."""
+    rng = np.random.default_rng([seed, 6])
+    scene = mechanism(seed)
+    busy = {driver.joint for driver in scene.driver} | {getattr(load, "joint", None) for load in scene.load}
+    busy |= {joint.name for joint in scene.joint if joint.reflected_inertia or joint.type == "universal"}
+    names = [joint.name for joint in scene.joint if joint.name not in busy]
+    latch, weak = [*rng.permutation(names), None, None][:2]
+    watched = [
+        joint.name for joint in scene.joint if joint.facts.coordinates and joint.name not in (latch, weak)
+    ]
+    opened = scene.with_(joint=[joint for joint in scene.joint if joint.name != latch])
+    free = mbref.simulate(opened, times=[0.0, 0.05, 0.1])
+    changes: dict[str | None, dict[str, Any]] = {}
+    if watched and len(free.times) == 3:
+        name = str(rng.choice(watched))
+        kind = scene.joint_named(name).facts.main
+        value = getattr(free.joint(name), kind)[2]
+        changes[latch] = {"when": {"joint": name, "coordinate": kind, "reaches": float(value)}}
+        forces = np.linalg.norm(free.joint(weak).force, axis=1) if weak else np.zeros(3)
+        if abs(forces[1] - forces[0]) > 1e-3 * forces[1] and not free.joint(weak).open.any():
+            changes[weak] = {"release": {"force": float(forces[1])}}
+    joints = [{**each.model_dump(), **changes.get(each.name, {})} for each in scene.joint]
+    return scene.with_(name=f"conditional_{seed}", duration=DURATION, joint=joints)

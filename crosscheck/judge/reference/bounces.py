@@ -1,19 +1,27 @@
-"""Times at which the reference meets or leaves end stops, and the impacts there, by one formulation."""
+"""Times at which the reference meets or leaves end stops or meets conditions, and the impacts there, by one
+formulation."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
 from crosscheck.judge.arithmetic import doubles
-from crosscheck.judge.constraints import joint_coordinates
-from crosscheck.judge.driver_forces import driver_forces
-from crosscheck.judge.pieces import State
+from crosscheck.judge.pieces import State, parts_of
 from crosscheck.judge.reference.motion import Motion
+from crosscheck.judge.reference.signals import (
+    FIELDS,
+    PULL,
+    Moved,
+    Seen,
+    Signal,
+    of_conditions,
+    of_stop,
+    refuse_open,
+)
 from crosscheck.judge.stops import (
     CHATTER,
     End,
@@ -21,17 +29,15 @@ from crosscheck.judge.stops import (
     ends_of,
     held,
     hits,
+    is_locked,
     rates_of,
     second_rates,
     still,
     width,
 )
-from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 
 Run = Callable[[Scene, np.ndarray], Motion]  # of a piece, at increasing times (k,), s
-Moved = Mapping[str, np.ndarray]  # angle (rad) and displacement (m) (2,) since t = 0, by joint
-FIELDS = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
 SAMPLES = 129  # least number of a piece, between which a gap closes at most once
 PER_STEP, PER_PERIOD = 8, 32  # samples for each step of the reference, and period of a function of time
 BETWEEN = 9  # samples from one change of a function's law to the next
@@ -39,40 +45,69 @@ BEFORE = 1e-12  # time before such a change / its time, at which forces have the
 STEPS = 12  # of a search for a time, each of which doubles its digits or halves its interval
 SOONEST = 1e-10  # of the longest time, below which an event is at the beginning
 AFTER = 1e-6  # time / end time, at which the force of a contact has its sign
-PULL = 1e-9  # force / largest force, which rounding may leave
+SAME = 1e-12  # difference of times / longest time, by rounding, of events at once
 
 
 class Bounces:
-    """End stops of a scene that a formulation moves up to an end time (s)."""
+    """End stops and conditions of a scene that a formulation moves up to an end time (s)."""
 
     def __init__(self, scene: Scene, run: Run, end: float):
-        self.ends, self._run, self._end = ends_of(scene), run, end
+        self.ends, self._scene, self._run, self._end = ends_of(scene), scene, run, end
+        self._locks = not all(part.is_permanent for part in parts_of(scene))
+        self._conditions = any(part.when or part.release for part in parts_of(scene))
 
-    def next(self, piece: Scene, contacts: Collection[str], moved: Moved, left: float) -> float | None:
-        """Return the time (s) in a piece at which a gap closes or a contact would pull; None otherwise."""
-        signals = [end for end in self.ends if self._acts(end, contacts)]
+    def next(
+        self, piece: Scene, contacts: Collection[str], moved: Moved, begin: float, left: float
+    ) -> tuple[float, tuple[str, ...]] | None:
+        """Return the time (s) of the next event of a piece that begins at a time (s), up to ``left``, and the
+        names of the stops and constraints that cause it: a gap closes, a contact would pull, a coordinate
+        reaches its value, or a reaction its limit. Return None without one.
+
+        Raises SceneError for a reaction that redundant constraints leave open.
+        """
+        if not self.ends and not self._conditions:
+            return None
         whole, window = held(piece, contacts), left
-        while signals:
-            found = self._followed(whole, window)
-            values = self._signals(whole, signals, contacts, moved, found)
-            floors = self._floors(piece, signals, contacts, values)
-            below = values < -floors
-            if below[1].any() if len(values) > 1 else False:
-                if window <= SOONEST * left:
-                    return 0.0
-                window = float(found.times[1])
-                continue
-            rows = np.flatnonzero(below.any(axis=1))
-            if rows.size:
+        seen = Seen(whole, found := self._followed(whole, window))
+        signals = [of_stop(piece, end, contacts, moved) for end in self._acting(piece, contacts, seen)]
+        if self._conditions and len(seen.times):
+            refuse_open(self._scene, seen)
+            signals += of_conditions(self._scene, piece, begin, moved, seen)
+        while signals and len(seen.times):
+            values = np.stack([signal.value(seen) for signal in signals], axis=1)
+            floors = [signal.floor(values[:, k]) for k, signal in enumerate(signals)]
+            below = values < -np.array(floors)
+            released = below[0] & [signal.is_force for signal in signals]
+            if released.any() or (len(values) > 1 and below[1].any() and window <= SOONEST * left):
+                first = released if released.any() else below[1]
+                return 0.0, tuple(signals[k].name for k in np.flatnonzero(first))
+            rows = 1 + np.flatnonzero(below[1:].any(axis=1))
+            if rows.size and rows[0] > 1:
                 around = slice(int(rows[0]) - 1, int(rows[0]) + 1)
-                return min(
-                    self._between(whole, signals[e], contacts, moved, found.times[around], values[around, e])
-                    for e in np.flatnonzero(below[rows[0]])
-                )
-            if window >= left or found.reason:
+                met = {
+                    signals[k].name: self._between(whole, signals[k], seen.times[around], values[around, k])
+                    for k in np.flatnonzero(below[rows[0]])
+                }
+                time = min(met.values())
+                return time, tuple(name for name, each in met.items() if each <= time + SAME * left)
+            if not rows.size and (window >= left or found.reason):
                 return None
-            window = min(16 * window, left)
+            window = min(16 * window, left) if not rows.size else float(seen.times[1])
+            seen = Seen(whole, found := self._followed(whole, window))
         return None
+
+    def _acting(self, piece: Scene, contacts: Collection[str], seen: Seen) -> list[End]:
+        """Return the ends in contact, and those that may be met: no end of their joint is in contact, and the
+        piece does not lock their coordinate."""
+        busy = {name.rpartition(".")[0] for name in contacts}
+        free = self._free(piece, [end for end in self.ends if end.joint not in busy], _first(seen))
+        return [end for end in self.ends if end.name in contacts or end in free]
+
+    def _free(self, piece: Scene, ends: Sequence[End], state: State | None) -> list[End]:
+        """Return the ends of coordinates that a piece does not lock in a state."""
+        if not self._locks or state is None:
+            return [*ends]
+        return [end for end in ends if not is_locked(piece, end.joint, state, end.column)]
 
     def _followed(self, piece: Scene, window: float) -> Motion:
         """Return the motion up to a time (s), at samples that resolve its steps and the functions of time."""
@@ -89,44 +124,10 @@ class Bounces:
         even = np.linspace(0.0, window, PER_STEP * found.steps)
         return self._run(piece, np.unique([*np.concatenate(parts), *even]))
 
-    def _acts(self, end: End, contacts: Collection[str]) -> bool:
-        """Return whether an end is in contact, or may be met because no end of its joint is in contact."""
-        return end.name in contacts or end.joint not in {name.rpartition(".")[0] for name in contacts}
-
-    def _floors(
-        self, piece: Scene, signals: Sequence[End], contacts: Collection[str], values: np.ndarray
-    ) -> np.ndarray:
-        """Return the sizes (e,) that rounding may give to gaps and to forces that are zero."""
-        sizes = np.abs(values).max(axis=0, initial=0.0)
-        return np.array(
-            [
-                PULL * size if end.name in contacts else 1e-2 * width(piece, end)
-                for end, size in zip(signals, sizes, strict=True)
-            ]
-        )
-
-    def _signals(
-        self, whole: Scene, signals: Sequence[End], contacts: Collection[str], moved: Moved, found: Motion
-    ) -> np.ndarray:
-        """Return gaps, and forces of contacts (k, e), along a motion."""
-        place, turn, spin = map(doubles, (found.position, found.orientation, found.angular_velocity))
-        coordinates = joint_coordinates(whole, doubles(found.times), place, turn, spin)
-        forces = driver_forces(whole, _as_trajectory(whole, found)) if contacts else {}
-        columns = []
-        for end in signals:
-            if end.name in contacts:
-                columns.append(-end.sign * forces[end.joint])
-            else:
-                q = coordinates[end.joint][:, end.column] + moved[end.joint][end.column]
-                columns.append(end.sign * (end.limit - q))
-        return np.stack(columns, axis=1)
-
     def _between(
         self,
         whole: Scene,
-        end: End,
-        contacts: Collection[str],
-        moved: Moved,
+        signal: Signal,
         times: np.ndarray,
         values: np.ndarray,
     ) -> float:
@@ -137,7 +138,7 @@ class Bounces:
             at = float(_inverse(points))
             at = at if low < at < high else (low + high) / 2
             found = self._run(whole, np.linspace(0.0, at, 9))
-            value = float(self._signals(whole, [end], contacts, moved, found)[-1, 0])
+            value = float(signal.value(Seen(whole, found))[-1])
             points = [*points[-3:], (at, value)]
             low, high = (at, high) if value > 0 else (low, at)
             if abs(points[-1][0] - points[-2][0]) <= 4 * np.finfo(float).eps * high or value == 0.0:
@@ -151,6 +152,7 @@ class Bounces:
         at the poses of the state, and ``moved`` are the coordinates there."""
         gaps = {end: end.sign * (end.limit - moved[end.joint][end.column]) for end in self.ends}
         touching = [end for end in self.ends if gaps[end] <= width(piece, end)]
+        touching = self._free(after, touching, before)
         wanted = hits(after, touching, before, contacts)
         found = bounced(after, before, touching, wanted).state
         for end in [end for end, rate in wanted.items() if rate > 0]:
@@ -174,7 +176,8 @@ class Bounces:
         while kept:
             names = [end.name for end in kept]
             found = self._run(held(piece, names), np.array([0.0, AFTER * self._end]))
-            pushes = self._signals(held(piece, names), kept, names, {}, found)[-1]
+            seen = Seen(held(piece, names), found)
+            pushes = np.array([of_stop(piece, end, names, {}).value(seen)[-1] for end in kept])
             if pushes.min() > PULL * np.abs(pushes).max():
                 break
             del kept[int(pushes.argmin())]
@@ -203,8 +206,8 @@ def _moving(piece: Scene, state: State) -> Scene:
     )
 
 
-def _as_trajectory(piece: Scene, found: Motion) -> Trajectory:
-    """Return a motion as a trajectory in double precision."""
-    arrays: dict[str, Any] = {key: doubles(getattr(found, key)) for key in FIELDS}
-    names = tuple(body.name for body in piece.body)
-    return Trajectory(piece.name, "judge", "", "", {}, doubles(found.times), names, **arrays)
+def _first(seen: Seen) -> State | None:
+    """Return the first state of a motion; None without one."""
+    if not len(seen.times):
+        return None
+    return State(*(getattr(seen.run, key)[0] for key in State._fields))

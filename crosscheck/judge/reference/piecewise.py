@@ -7,7 +7,7 @@ Each formulation runs through all pieces on its own, so that its errors at an ev
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from typing import Any
 
@@ -15,13 +15,14 @@ import numpy as np
 
 from crosscheck.judge.arithmetic import Arithmetic, doubles
 from crosscheck.judge.constraints import joint_coordinates
-from crosscheck.judge.pieces import State, at_start, events, followed, has_pieces, later
+from crosscheck.judge.pieces import State, at_start, changed, events, followed, has_pieces, later
 from crosscheck.judge.reference.bounces import Bounces
 from crosscheck.judge.reference.motion import Motion, Times
 from crosscheck.judge.stops import held
 from mbref.scene import Scene, SceneError
 
 Formulation = Callable[..., Motion]
+ROUNDING = 1e-14  # distance of an event from a sample / end time, by rounding
 BETWEEN = 64  # samples of a piece between which turns of joints with loads are counted
 FIELDS = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
 
@@ -49,8 +50,17 @@ def motion_by(
         piece, contacts = _after(scene, piece, 0.0, run(piece, np.zeros(1)), moved, (), bounces)
     while True:
         stop = next((t for t in events(scene, float(wanted[-1])) if t > begin), None)
-        met = bounces.next(piece, contacts, moved, (float(wanted[-1]) if stop is None else stop) - begin)
-        stop = stop if met is None else begin + met
+        left = (float(wanted[-1]) if stop is None else stop) - begin
+        try:
+            met = bounces.next(piece, contacts, moved, begin, left)
+        except SceneError as error:
+            found = _later(run(held(piece, contacts), np.zeros(1)), begin, wanted[wanted == begin])
+            parts.append(replace(found, reason=error.faults[0]))
+            break
+        if met is not None:
+            near = wanted[np.abs(wanted - begin - met[0]) <= ROUNDING * wanted[-1]]
+            stop = float(near[0]) if near.size else begin + met[0]
+        names = () if met is None else met[1]
         chosen = wanted[(wanted >= begin) & (wanted < (np.inf if stop is None else stop))]
         own = np.unique([*(chosen - begin), *([] if stop is None else np.linspace(0, stop - begin, BETWEEN))])
         found = run(held(piece, contacts), own)
@@ -59,7 +69,7 @@ def motion_by(
             break
         moved = _moved(piece, found, moved)
         try:
-            piece, contacts = _after(scene, piece, stop, found, moved, contacts, bounces)
+            piece, contacts = _after(scene, piece, stop, found, moved, contacts, bounces, names)
         except SceneError as error:
             parts[-1] = replace(parts[-1], reason=error.faults[0])
             break
@@ -75,13 +85,15 @@ def _after(
     moved: dict[str, np.ndarray],
     contacts: tuple[str, ...],
     bounces: Bounces,
+    met: Collection[str] = (),
 ) -> tuple[Scene, tuple[str, ...]]:
     """Return the piece that begins at t (s) with the velocities after the impact at the end of a motion, and
-    the end stops in contact."""
+    the end stops in contact; ``met`` are the parts whose conditions are met."""
     before = State(*(doubles(getattr(found, key)[-1]) for key in State._fields))
-    after = later(scene, piece, t, before, moved)
+    names = changed(scene, piece, t, met)
+    after = later(scene, piece, t, before, moved, names)
     state, contacts = bounces.meet(piece, after, before, contacts, moved)
-    return later(scene, piece, t, state, moved), contacts
+    return later(scene, piece, t, state, moved, names), contacts
 
 
 def _unmoved(scene: Scene) -> dict[str, np.ndarray]:

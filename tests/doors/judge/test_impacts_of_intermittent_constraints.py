@@ -13,7 +13,7 @@ from crosscheck.judge.reference.piecewise import motion_by
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref import Scene
-from tests.helpers.intermittent_mechanisms import carts, intermittent_mechanism, rotors
+from tests.helpers.intermittent_mechanisms import carts, conditional_mechanism, intermittent_mechanism, rotors
 from tests.helpers.parts import hinge, joint, rod
 
 FORMULATIONS = {"A": natural_motion, "B": tree_motion}
@@ -61,10 +61,14 @@ def test_reference_has_closed_forms_of_a_latch_and_a_clutch(formulation):
     assert np.abs(doubles(found.angular_velocity)[:, :, 2] - wanted).max() <= ROUNDING
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_random_impacts_of_mbref_balance_by_the_judge(seed):
+DRAWN = [(intermittent_mechanism, 0), (intermittent_mechanism, 1), (intermittent_mechanism, 3)]
+DRAWN += [(conditional_mechanism, 2), (conditional_mechanism, 3)]
+
+
+@pytest.mark.parametrize(("make", "seed"), DRAWN)
+def test_random_impacts_of_mbref_balance_by_the_judge(make, seed):
     """Momentum of each body and energy at each event; constraints of each piece between them."""
-    scene = intermittent_mechanism(seed)
+    scene = make(seed)
     run = mbref.simulate(scene, times=TIMES)
     found = measure(scene, run)
     assert run.events and found["impact_error"] is not None
@@ -75,8 +79,8 @@ def test_random_impacts_of_mbref_balance_by_the_judge(seed):
 @pytest.mark.parametrize("seed", range(200))
 def test_many_random_motions_through_impacts_agree_with_the_reference(seed):
     """Positions (m) agree to 1000 rtol, 1e-11, as impacts magnify errors. A motion may end early with a
-    reason."""
-    scene = intermittent_mechanism(seed)
+    reason. Every fourth mechanism has conditions, of which the reference finds its own events."""
+    scene = (intermittent_mechanism if seed % 4 else conditional_mechanism)(seed)
     run = mbref.simulate(scene, times=TIMES, rtol=1e-11)
     found = measure(scene, run)
     assert {name: found[name] for name in BALANCES if not (found[name] or 0.0) <= CLOSE} == {}

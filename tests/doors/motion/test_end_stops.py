@@ -159,7 +159,9 @@ def test_stop_is_refused_at_a_driven_joint_in_a_diagnosis_and_by_an_engine_witho
     adapter of MuJoCo maps no stops."""
     with pytest.raises(SceneError, match="needs a joint without a driver"):
         door().with_(driver=[{"joint": "A", "polynomial": [0.0, 1.0]}])
-    with pytest.raises(SceneError, match=r"joint\[A\]\.stop: only motions have intervals and stops"):
+    with pytest.raises(
+        SceneError, match=r"joint\[A\]\.stop: only motions have intervals, conditions and stops"
+    ):
         mbref.diagnose(door())
     assert "joint 'A' has an end stop" in str(engine("mujoco").supports.missing(door()))
 

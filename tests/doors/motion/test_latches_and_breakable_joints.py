@@ -1,0 +1,227 @@
+"""Conditions of joints and couplings: latches where a coordinate reaches a value, joints that break by their
+reaction, restarts, refusals; closed forms, and the judge's own events."""
+
+import numpy as np
+import pytest
+
+import mbref
+from crosscheck.engine import engine
+from crosscheck.judge.arithmetic import EXTENDED, doubles
+from crosscheck.judge.reference.piecewise import motion_by
+from crosscheck.judge.reference.taylor import natural_motion
+from crosscheck.judge.reference.tree import tree_motion
+from mbref import Motion, Scene, SceneError
+from tests.helpers.coupled_mechanisms import body
+from tests.helpers.intermittent_mechanisms import carts, rotors
+from tests.helpers.parts import Z, hinge, joint, rod, slide
+
+ROUNDED = 1e-12  # s, m, rad, m/s and N of mechanisms of about 1 m, 1 kg and 1 s
+G, ORIGIN = 10.0, (0.0, 0.0, 0.0)
+BEGIN = 1.2  # rad, angle at which the bob of a pendulum of 1 m and 1 kg is let go
+
+
+def bob(limit: float) -> Scene:
+    """A bob on a massless rope of 1 m, which breaks at a tension (N)."""
+    place = (np.sin(BEGIN), -np.cos(BEGIN), 0.0)
+    rope = joint("R", "distance", "ground", "bob", anchors=[ORIGIN, place], release={"force": limit})
+    mass = body("bob", 1.0, [0.1] * 3, place)
+    return Scene(name="bob", gravity=(0.0, -G, 0.0), duration=1.0, body=[mass], joint=[rope])
+
+
+PUSH = 5.0  # N m/s, rate of the moment that opens the door from 1 s on
+HOLD = 3.0  # N, force at the door's edge, 1 m from its hinge, at which the catch lets go
+INERTIA = 0.2 + 2.0 * 0.25  # kg m², of the door about its hinge
+CLOSED = -0.5  # rad
+
+
+def door() -> Scene:
+    """A door that closes at 2 rad/s onto a stop, where a catch holds it until a moment pulls it open."""
+    edge = [np.cos(CLOSED), np.sin(CLOSED), 0.0]
+    moving = {"velocity": [0.0, -1.0, 0.0], "angular_velocity": [0.0, 0.0, -2.0]}
+    push = {"type": "moment", "body": "door", "moment": [0.0, 0.0, PUSH]}
+    at_stop = {"lower": CLOSED, "restitution": 0.5}
+    when, release = {"joint": "A", "reaches": CLOSED}, {"force": HOLD}
+    return Scene(
+        name="door",
+        duration=2.0,
+        body=[body("door", 2.0, [0.1, 0.2, 0.2], (0.5, 0.0, 0.0), **moving)],
+        joint=[
+            hinge("A", "ground", "door", ORIGIN, Z, stop=at_stop),
+            joint("C", "inline", "ground", "door", edge, axis=edge, when=when, release=release),
+        ],
+        load=[{**push, "factor": {"polynomial": [-1.0, 1.0], "start": 1.0}}],
+    )
+
+
+@pytest.fixture(scope="module")
+def door_motion() -> Motion:
+    return mbref.simulate(door(), "taylor", times=[0.0, 0.1, 0.25, 1.0, 1.8, 2.0], rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    "when",
+    [
+        {"joint": "A", "reaches": "200 mm"},
+        {"bodies": ["one", "two"], "points": [ORIGIN, (1.0, 0.0, 0.0)], "reaches": 0.7},
+    ],
+    ids=["travel", "distance"],
+)
+def test_carts_latch_where_a_travel_or_a_distance_reaches_its_value(when):
+    """2 m/s · t = 0.2 m and 1 m - 3 m/s · t = 0.7 m at 0.1 s; then v = (m₁ v₁ + m₂ v₂) / (m₁ + m₂)."""
+    motion = mbref.simulate(carts(active=None, when=when), "taylor", times=[0.0, 0.1, 0.5])
+    (event,) = motion.events
+    assert abs(event.time - 0.1) <= ROUNDED and event.engaged == ("L",)
+    assert np.abs(motion.velocity[:, :, 0] - [[2, -1], *[[-0.25, -0.25]] * 2]).max() <= ROUNDED
+    assert motion.joint("L").active.tolist() == [0, 1, 1]
+
+
+def test_pendulum_released_by_its_tension_falls_freely():
+    """T = m g (3 cos θ - 2 cos θ₀) gives the angle, v² = 2 g (cos θ - cos θ₀) the speed of the fall."""
+    motion = mbref.simulate(bob(20.0), "taylor", times=[0.0, 1.0], rtol=1e-13)
+    (event,) = motion.events
+    angle = np.arccos((20.0 / G + 2 * np.cos(BEGIN)) / 3)
+    place = np.array([np.sin(angle), -np.cos(angle), 0.0])
+    speed = -np.sqrt(2 * G * (np.cos(angle) - np.cos(BEGIN))) * np.array([np.cos(angle), np.sin(angle), 0.0])
+    left = 1.0 - event.time
+    fallen = place + speed * left - [0.0, G * left**2 / 2, 0.0]
+    assert event.released == ("R",) and np.abs(event.position[0] - place).max() <= ROUNDED
+    assert np.abs(event.velocity_after[0] - speed).max() <= ROUNDED
+    assert np.abs(motion.position[-1, 0] - fallen).max() <= ROUNDED and not motion.joint("R").force[-1].any()
+
+
+@pytest.mark.parametrize(
+    ("pull", "release"),
+    [
+        ({"type": "force", "point": ORIGIN, "force": [4.0, 3.0, 0.0]}, {"force": 5.0}),
+        ({"type": "force", "point": ORIGIN, "force": [-5.0, 7.0, 0.0]}, {"force": 5.0, "component": "x"}),
+        ({"type": "force", "point": ORIGIN, "force": [5.0, 0.0, 0.0]}, {"force": "5 N", "component": "-x"}),
+        ({"type": "moment", "moment": [0.0, 0.0, 5.0]}, {"moment": "5 N m"}),
+    ],
+    ids=["size", "x", "-x", "moment"],
+)
+def test_bracket_breaks_where_its_reaction_reaches_the_limit(pull, release):
+    """The reaction is minus the pull, whose size 5 t (N or N m) is at its limit at 1 s."""
+    load = {**pull, "body": "a", "factor": {"polynomial": [0.0, 1.0]}}
+    bracket = joint("B", "fixed", "ground", "a", release=release)
+    scene = Scene(
+        name="b", duration=1.5, body=[body("a", 1.0, [0.1] * 3, ORIGIN)], joint=[bracket], load=[load]
+    )
+    (event,) = mbref.simulate(scene, "taylor").events
+    assert event.released == ("B",) and abs(event.time - 1.0) <= ROUNDED
+
+
+def test_catch_takes_the_door_at_its_stop_and_lets_go_by_its_force(door_motion):
+    """Closed after 0.5 rad / 2 rad/s, without a bounce; force PUSH (t - 1); then I φ'' = PUSH (t - 1)."""
+    closed, opened = door_motion.events
+    assert (closed.engaged, closed.stops, opened.released) == (("C",), (), ("C",))
+    assert abs(closed.time - 0.25) <= ROUNDED and abs(opened.time - 1.0 - HOLD / PUSH) <= ROUNDED
+    assert (
+        closed.energy_before == pytest.approx(INERTIA * 4 / 2, rel=ROUNDED) and closed.energy_after <= ROUNDED
+    )
+    free = door_motion.times[-2:] - 1.0
+    begin = HOLD / PUSH
+    turned = PUSH / INERTIA * ((free**3 - begin**3) / 6 - begin**2 / 2 * (free - begin))
+    assert np.abs(door_motion.joint("A").angle[-2:] - CLOSED - turned).max() <= ROUNDED
+
+
+@pytest.mark.parametrize(("t", "later"), [(0.1, 2), (0.25, 1), (1.8, 0)])
+def test_scene_at_carries_whether_the_catch_holds(door_motion, t, later):
+    """Before it closes, closed, and opened: the run from there has the later events and the last pose."""
+    rest = mbref.simulate(door_motion.scene_at(t), "taylor", times=[0.0, 2.0 - t], rtol=1e-13)
+    assert len(rest.events) == later
+    assert np.abs(rest.position[-1] - door_motion.position[-1]).max() <= ROUNDED
+
+
+def test_broken_joint_is_no_part_of_the_scene_after_it():
+    motion = mbref.simulate(bob(20.0), "taylor", times=[0.0, 0.9, 1.0])
+    fallen = motion.scene_at(0.9)
+    assert not fallen.joint
+    assert np.abs(mbref.simulate(fallen, times=[0.1]).position - motion.position[-1]).max() <= 1e-9  # rtol
+
+
+def test_linkage_that_locks_at_an_angle_becomes_a_truss_at_rest():
+    """A rod falls by 0.3 rad and pulls a block along a slide, until a weld of rod and ground locks both."""
+    rods = [rod("a", ORIGIN, (1.0, 0.0, 0.0)), body("c", 2.0, [0.1] * 3, (1.5, 0.0, 0.0))]
+    link = joint("B", "distance", "a", "c", anchors=[(1.0, 0.0, 0.0), (1.5, 0.0, 0.0)])
+    weld = joint("W", "spherical", "ground", "a", (0.5, 0.0, 0.0), when={"joint": "A", "reaches": -0.3})
+    joints = [hinge("A", "ground", "a", ORIGIN), link, slide("S", "ground", "c", (1.5, 0.0, 0.0)), weld]
+    scene = Scene(name="truss", gravity=(0.0, -G, 0.0), duration=1.0, body=rods, joint=joints)
+    motion = mbref.simulate(scene, "taylor", times=[0.0, 0.9, 1.0], rtol=1e-13)
+    (event,) = motion.events
+    assert abs(event.angles["A"] + 0.3) <= ROUNDED
+    assert event.energy_before == pytest.approx(0.5 * G * np.sin(0.3), rel=ROUNDED)  # m g l / 2 sin 0.3
+    assert event.energy_after <= ROUNDED and np.abs(motion.velocity[1:]).max() <= ROUNDED
+
+
+def test_clutch_that_cannot_carry_its_load_lets_go_at_once():
+    """Braked by 10 rad/s², the rotor reaches 6 t - 5 t² = 1 rad at 0.2 s with 4 rad/s. The clutch, of ratio
+    1/2, jerks it to 4 · 0.3 / 0.375 rad/s, and would carry 1.2 N m, more than its limit."""
+    when, release = {"joint": "A", "reaches": "1 rad"}, {"joint": "B", "moment": 1.0}
+    coupling = [{"name": "clutch", "joints": ["A", "B"], "ratio": 0.5, "when": when, "release": release}]
+    brake = {"type": "joint_torque", "joint": "A", "torque": -3.0}
+    scene = rotors().with_(coupling=coupling, load=[brake])
+    motion = mbref.simulate(scene, "taylor", times=[0.0, 0.4], rtol=1e-13)
+    assert [event.engaged for event in motion.events] == [("clutch",), ()]
+    assert all(abs(event.time - 0.2) <= ROUNDED for event in motion.events)
+    assert np.abs(motion.angular_velocity[-1, :, 2] - [3.2 - 10.0 * 0.2, 1.6]).max() <= ROUNDED
+
+
+RUNS = [(bob(20.0), natural_motion), pytest.param(door(), tree_motion, marks=pytest.mark.slow)]
+
+
+@pytest.mark.parametrize(("scene", "formulation"), RUNS, ids=["bob A", "door B"])
+def test_judge_finds_latches_and_releases_by_itself(scene, formulation):
+    """Formulations A and B locate coordinates and reactions by their own motions, not by mbref's events."""
+    times = np.linspace(0.0, scene.duration, 5)
+    motion = mbref.simulate(scene, "taylor", times=times, rtol=1e-13)
+    found = motion_by(formulation, scene, times, EXTENDED, seconds=60.0)
+    assert not found.reason and np.abs(doubles(found.position) - motion.position).max() <= ROUNDED
+    assert np.abs(doubles(found.velocity) - motion.velocity).max() <= ROUNDED
+
+
+def test_release_by_a_force_that_redundant_joints_share_is_refused_by_name():
+    """Two welds hold a mass; how they share its weight depends on what is not in the scene."""
+    welds = [
+        joint(name, "fixed", "ground", "a", release=by) for name, by in [("B", {"force": 1.0}), ("C", None)]
+    ]
+    mass = body("a", 1.0, [0.1] * 3, ORIGIN)
+    scene = Scene(name="two", gravity=(0.0, -G, 0.0), body=[mass], joint=welds)
+    with pytest.raises(
+        SceneError, match=r"B\.release: redundant constraints leave the force in joint 'B' open"
+    ):
+        mbref.simulate(scene)
+    assert "redundant constraints" in motion_by(natural_motion, scene, [0.0, 1.0], EXTENDED).reason
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"when": {"joint": "X", "reaches": 1.0}}, "joint[L].when.joint: unknown joint 'X'; known: A, B, L"),
+        ({"when": {"joint": "L", "reaches": 1.0}}, "joint[L].when.joint: needs a joint that always holds"),
+        (
+            {"when": {"joint": "A", "reaches": "3 deg"}},
+            "when.reaches: is of the displacement of 'A', got '3 deg'",
+        ),
+        ({"when": {"reaches": 1.0}}, "joint[L].when: needs a joint, or bodies and points"),
+        (
+            {"when": {"bodies": ["one", "two"], "reaches": 1.0}},
+            "joint[L].when.points: is required for a distance",
+        ),
+        ({"release": {"force": 1.0, "moment": 1.0}}, "joint[L].release: needs a force or a moment, not both"),
+        ({"release": {"force": 1.0}, "holds_at_start": False}, "holds_at_start: lets it never hold"),
+        (
+            {"holds_at_start": True},
+            "joint[L].holds_at_start: is of a constraint with active, when or release",
+        ),
+    ],
+)
+def test_fault_of_a_condition_names_joint_and_field(changes, says):
+    with pytest.raises(SceneError) as fault:
+        carts(**{"active": None, **changes})
+    assert says in str(fault.value)
+
+
+def test_engine_refuses_a_condition_by_its_path():
+    latched = carts(active=None, when={"joint": "A", "reaches": 0.2})
+    refused = [str(engine(name).supports.missing(latched)) for name in ("mujoco", "pinocchio", "exudyn")]
+    assert all(refusal.startswith("joint[L].when is a condition") for refusal in refused)
