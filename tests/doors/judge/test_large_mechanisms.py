@@ -44,8 +44,9 @@ def test_joints_of_a_large_mechanism_are_closed_at_the_start_to_rounding(seed: i
     assert max(np.abs(x).max(initial=0.0) for x in off) < 1e-12
 
 
-def test_large_mechanisms_differ_in_their_numbers_of_parts_loops_and_redundant_rows():
-    """Ranks of the parts of each Jacobian also add up to its rank by singular values, `rank`."""
+def test_large_mechanisms_differ_in_parts_loops_and_redundant_rows_and_ranks_of_parts_add_up():
+    """Each number has more than one value on four mechanisms, so that a test on them meets different cases.
+    Ranks of the parts of a Jacobian add up to its rank by singular values, `rank`."""
     seen: dict[str, set[int]] = {"parts": set(), "loops": set(), "redundant": set()}
     for scene in map(large_graph, SMALL):
         rows = jacobian(scene, 0.0, *initial_poses(scene))[0]

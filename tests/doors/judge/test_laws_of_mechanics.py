@@ -1,6 +1,7 @@
 """Laws of mechanics that motions, loads, reactions and drivers of the judge obey at 0.43 of the duration."""
 
 import functools
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -29,7 +30,13 @@ QUICK = (  # one for each kind of joint, load, driver and coupling
     "planet with armatures", "coupled displacements", "screw with armature", "free bodies and a spring",
     "doubled hinge", "point_pendulum",
 )  # fmt: skip
-ALL = [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in MOTIONS if n not in CROSSED]
+
+
+def each(condition: Callable[[Scene], bool] = lambda _: True) -> pytest.MarkDecorator:
+    """Return the parametrisation by short motions without singular position that meet a condition."""
+    names = [name for name in MOTIONS if name not in CROSSED and condition(MOTIONS[name]())]
+    cases = [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in names]
+    return pytest.mark.parametrize("name", cases)
 
 
 @functools.cache
@@ -46,7 +53,7 @@ def slope(run: Trajectory, values: np.ndarray) -> np.ndarray:
     return np.tensordot(np.array([1, -8, 0, 8, -1]) / (12 * (run.times[1] - run.times[0])), values, 1)
 
 
-@pytest.mark.parametrize("name", ALL)
+@each()
 def test_positions_velocities_and_accelerations_obey_the_joints_to_rounding(name):
     """Violations are relative to the mechanism's length. Rates grow with the angular velocity ω (rad/s),
     accelerations with ω². 1e-13 is 500 roundings; accelerations lose another digit to the factorisation."""
@@ -58,7 +65,7 @@ def test_positions_velocities_and_accelerations_obey_the_joints_to_rounding(name
     assert found["violation_acceleration"] <= 1e-12 * spin**2
 
 
-@pytest.mark.parametrize("name", ALL)
+@each()
 def test_velocities_and_accelerations_are_differences_of_neighbouring_poses_and_velocities(name):
     """Differences of fourth order over 4e-4 of the duration are exact to 1e-8; the margin is ten."""
     _, run = at_one_moment(name)
@@ -84,7 +91,7 @@ def state_of(scene: Scene, run: Trajectory, k: int) -> tuple[np.ndarray, ...]:
     return run.position[k], run.orientation[k], run.velocity[k], run.angular_velocity[k], turned
 
 
-@pytest.mark.parametrize("name", ALL)
+@each()
 def test_accelerations_of_the_motion_obey_gauss_principle(name):
     """Gauss's principle of least constraint is solved at the pose and velocities of the sample. It shares no
     code with the reference's equations, whose interpolation error is 1e-10 of the largest acceleration."""
@@ -94,7 +101,7 @@ def test_accelerations_of_the_motion_obey_gauss_principle(name):
     assert np.abs(found - wanted).max() <= 1e-9 * np.abs(wanted).max()
 
 
-@pytest.mark.parametrize("name", ALL)
+@each()
 def test_power_of_weight_loads_and_drivers_is_the_rate_of_the_kinetic_energy(name):
     """dT/dt = P, with dT/dt as a difference of fourth order. Its relative error is 1e-8, and T may change by
     all of itself in a hundredth of the duration: 1e-6 of T over the duration."""
@@ -113,10 +120,7 @@ def is_bare(scene: Scene) -> bool:
     return not (scene.load or scene.coupling or any(joint.reflected_inertia for joint in scene.joint))
 
 
-BARE = [name for name in MOTIONS if is_bare(MOTIONS[name]()) and name not in CROSSED]
-
-
-@pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in BARE])
+@each(is_bare)
 def test_reactions_by_the_judge_obey_newtons_and_eulers_equations_of_every_body(name):
     """m a = m g + Σ F and J ω' + ω × J ω = Σ M, for mechanisms without loads, couplings and armatures. What
     remains is relative to the largest force or moment; accelerations are exact to about 1e-10."""
@@ -131,14 +135,7 @@ def keeps_energy(scene: Scene) -> bool:
     return not scene.driver and kinds <= {"spring", "torsion_spring", "slide_spring"} and undamped
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        n if n in QUICK else pytest.param(n, marks=pytest.mark.slow)
-        for n in MOTIONS
-        if keeps_energy(MOTIONS[n]()) and n not in CROSSED
-    ],
-)
+@each(keeps_energy)
 def test_energy_of_an_undamped_mechanism_is_its_energy_at_the_start(name):
     """The largest change of the energy since the start is at most 5000 roundings of the largest energy."""
     scene, run = at_one_moment(name)

@@ -58,15 +58,11 @@ def test_energy_error_is_none_if_bodies_turn_six_times_between_samples():
 
 
 @pytest.mark.parametrize(
-    ("name", "without"),
-    [
-        pytest.param("four_bar", 0.0, id="rhombus at constant speed"),
-        pytest.param("spatial_slider_crank_driven", 1.0, id="crank that rests without its driver"),
-    ],
+    ("name", "without"), [("four_bar", 0.0), ("spatial_slider_crank_driven", 1.0)], ids=["rhombus", "crank"]
 )
 def test_energy_error_is_none_for_a_driven_scene(name, without):
-    """The work of the driver is unknown. For the scene without driver, the motion of the rhombus keeps its
-    energy, and the motion of the crank has gained all of it."""
+    """The work of the driver is unknown. For the scene without driver, the motion of the rhombus, at constant
+    speed, keeps its energy, and the motion of the crank, which starts at rest, has gained all of it."""
     scene = SCENES[name]()
     motion = truth_for(scene).poses(np.linspace(0, 0.1, 41))
     assert measure(scene, motion)["energy_error"] is None

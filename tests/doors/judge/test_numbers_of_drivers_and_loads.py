@@ -7,8 +7,8 @@ from scipy.interpolate import CubicSpline
 import crosscheck
 from crosscheck.cli import main
 from crosscheck.conformance.changes.units import in_other_units
-from mbref.scene import Body, Coupling, Driver, Revolute, Scene, SlideSpring, Spring, TorsionSpring
-from tests.helpers.parts import hinge, slide
+from mbref.scene import Coupling, Driver, Scene, SlideSpring, TorsionSpring
+from tests.helpers.parts import hinge, slide, spring
 from tests.helpers.statics import parallelogram, rod
 
 INERTIA, ARMATURE, RATE = 0.3, 1.1, 2.4  # kg m², kg m², rad/s²
@@ -16,51 +16,39 @@ INERTIA, ARMATURE, RATE = 0.3, 1.1, 2.4  # kg m², kg m², rad/s²
 
 def driven(armature: float = 0.0, ratio: float | None = None) -> Scene:
     """Return a disc that a driver accelerates evenly, with a second disc at a gear if there is a ratio."""
-    inertia = (0.2, 0.2, INERTIA)
-    bodies = [Body(name="first", mass=1.0, inertia=inertia, position=(0.0, 0.0, 0.0))]
-    axis = {"axis": (0.0, 0.0, 1.0)}
-    hinges = [Revolute(name="A", bodies=("ground", "first"), anchor=(0, 0, 0), armature=armature, **axis)]
-    if ratio is not None:
-        bodies.append(Body(name="second", mass=1.0, inertia=inertia, position=(1.0, 0.0, 0.0)))
-        hinges.append(Revolute(name="B", bodies=("ground", "second"), anchor=(1, 0, 0), **axis))
-    gears = [] if ratio is None else [Coupling(name="gear", joints=("A", "B"), ratio=ratio)]
-    return Scene(
-        name="driven_discs",
-        gravity=(0.0, -9.81, 0.0),
-        duration=1.0,
-        body=bodies,
-        joint=hinges,
-        coupling=gears,
-        driver=[Driver(joint="A", polynomial=(0.0, 0.0, RATE / 2))],
-    )
+    bodies = [rod(name, (k, 0, 0), 1.0, INERTIA) for k, name in enumerate(("first", "second"))]
+    hinges = [
+        hinge("A", "ground", "first", (0, 0, 0), armature=armature),
+        hinge("B", "ground", "second", (1, 0, 0)),
+    ]
+    count = 1 if ratio is None else 2
+    gears = [Coupling(name="gear", joints=("A", "B"), ratio=ratio)] if ratio else []
+    parts = {"body": bodies[:count], "joint": hinges[:count], "coupling": gears}
+    driver = [Driver(joint="A", polynomial=(0.0, 0.0, RATE / 2))]
+    return Scene(name="driven_discs", gravity=(0.0, -9.81, 0.0), duration=1.0, driver=driver, **parts)
 
 
 def machine(seed: int) -> Scene:
     """Return a driven crank with armature, a slide with spring, and a spring between points, of random sizes
     under a gravity of random direction."""
     size = np.random.default_rng(seed).uniform(0.3, 1.0, 12)
-    mass, inertia = size[0] + 0.5, (0.1 + size[1], 0.1 + size[1], 0.1 + size[1])
+    inertia, gravity = 0.1 + size[1], tuple(9.81 * (size[2:5] - 0.6))
+    crank, block = (
+        rod("crank", (0.3, 0, 0), size[0] + 0.5, inertia),
+        rod("block", (1.0, 0, 0), size[5], inertia),
+    )
     return Scene(
         name="machine",
-        gravity=tuple(9.81 * (size[2:5] - 0.6)),
+        gravity=gravity,
         duration=1.0,
-        body=[
-            Body(name="crank", mass=mass, inertia=inertia, position=(0.3, 0.0, 0.0)),
-            Body(name="block", mass=size[5], inertia=inertia, position=(1.0, 0.0, 0.0)),
-        ],
+        body=[crank, block],
         joint=[
             hinge("A", "ground", "crank", (0, 0, 0), armature=size[6]),
             slide("B", "crank", "block", (1, 0, 0), armature=size[7]),
         ],
         load=[
             SlideSpring(joint="B", stiffness=20 * size[8], damping=size[9], natural_displacement=0.2),
-            Spring(
-                bodies=("ground", "block"),
-                points=((0.2, 1.5, 0.1), (1.1, 0.1, 0.0)),
-                stiffness=10 * size[10],
-                damping=0.5,
-                natural_length=0.5,
-            ),
+            spring("ground", (0.2, 1.5, 0.1), "block", (1.1, 0.1, 0.0), 10 * size[10], 0.5, 0.5),
         ],
         driver=[Driver(joint="A", polynomial=(0.0, 0.5, 1.0), sine={"amplitude": 0.3, "frequency": 4.0})],
     )
@@ -92,10 +80,8 @@ def test_change_of_the_energy_is_the_drivers_work_less_the_dampers_losses(seed: 
     largest energy; the limit has a margin of ten. The spring's force is k (l - 0.5 m) + c l'."""
     scene, times = machine(seed), np.linspace(0.0, 1.0, 401)
     table = crosscheck.reference_table(scene, times)
-    spring, bar = scene.load
-    lost = (
-        spring.damping * table["B.displacement_rate"] ** 2 + bar.damping * table["load(1).length_rate"] ** 2
-    )
+    guide, bar = scene.load
+    lost = guide.damping * table["B.displacement_rate"] ** 2 + bar.damping * table["load(1).length_rate"] ** 2
     work = CubicSpline(times, table["driver(A).power"] - lost).antiderivative()(times)
     gained = table["energy"] - table["energy"][0]
     assert np.abs(gained - work).max() <= 1e-7 * np.abs(table["energy"]).max()
@@ -137,7 +123,7 @@ def wound_disc() -> Scene:
         gravity=(0.0, 0.0, 0.0),
         duration=10.0,
         body=[rod("disc", (0, 0, 0), 1.0, 1.0) | {"angular_velocity": (0, 0, 10.0)}],
-        joint=[Revolute(name="A", bodies=("ground", "disc"), anchor=(0, 0, 0), axis=(0, 0, 1))],
+        joint=[hinge("A", "ground", "disc", (0, 0, 0))],
         load=[TorsionSpring(joint="A", stiffness=1.0)],
     )
 

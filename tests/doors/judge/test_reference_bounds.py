@@ -72,7 +72,6 @@ def test_least_squares_of_nearly_parallel_columns_lose_six_digits_alone():
     assert np.abs(found - exact).max() < 1e-12
 
 
-# --- singular positions, and what looks like one ----------------------------------------------------------
 def drawn(seed: int, joint: str) -> Scene:
     """A random mechanism with a torsion spring."""
     scene = random_mechanism(seed)
