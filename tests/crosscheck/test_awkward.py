@@ -17,7 +17,6 @@ from tests.crosscheck.measured import in_many_digits
 SECONDS = 200.0
 QUICK = ("rccc", "rounded_platform", "pushed_dead_centre")
 ENDING = ("locking", "phased_crank")  # their motion ends before the scene's duration, in a dead centre
-ALIKE = 1e-15  # m or rad; ten times the 1e-16 to which both formulations are integrated
 LARGE = ("chain_of_twenty", "tumbling_chain")  # a run in thirty digits takes minutes
 SHORTER = {"stiff_chain": 0.3, "stiff_dampers": 0.2, "rounded_door": 0.5}  # s; duration of the test
 
@@ -57,7 +56,7 @@ def test_both_formulations_of_the_reference_agree_on_a_gimbal():
     scene, times = awkward("gimbal", 0), np.linspace(0.0, 0.12, 4)
     a, b = (move(scene, times, EXTENDED, seconds=SECONDS) for move in (natural_motion, tree_motion))
     assert not a.reason and not b.reason
-    assert differences(scene, a, b).max() < ALIKE
+    assert differences(scene, a, b).max() < 1e-15
 
 
 def test_collocation_steps_with_an_ill_conditioned_mass_matrix_are_accepted():

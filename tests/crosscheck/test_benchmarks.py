@@ -10,7 +10,6 @@ from mbref.scenes import SCENES
 from tests.crosscheck.measured import relative_error
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
-ERROR = 1e-8  # of the length, or rad, at the tolerance 1e-11; fast scenes magnify local errors
 # scenes in closed form, and one whose equation is integrated; others take seconds to compile
 QUICK = ("four_bar", "spatial_slider_crank_driven", "planar_slider_crank_gravity")
 PLANAR = [f"planar_slider_crank{variant}" for variant in ("", "_equal", "_heavy", "_gravity")]
@@ -39,7 +38,7 @@ def test_equation_derived_by_hand_gives_the_true_motion(name: str):
 
     scene = SCENES[name]()
     assert LIMIT.cannot(scene) is None
-    assert error_of(LIMIT, name, LIMIT.settings(scene)[-1]) < ERROR
+    assert error_of(LIMIT, name, LIMIT.settings(scene)[-1]) < 1e-8
 
 
 @pytest.mark.slow

@@ -44,6 +44,7 @@ def test_a_silent_call_after_a_long_output_has_no_output(child: Child):
 
 
 def test_a_child_has_the_environment_variables_of_its_parent_when_it_starts(monkeypatch: pytest.MonkeyPatch):
+    """The second child starts after the parent has changed the variable."""
     for value in ("first", "second"):
         monkeypatch.setenv("CROSSCHECK_PROBE", value)
         with closing(Child()) as made:

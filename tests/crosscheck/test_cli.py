@@ -134,6 +134,7 @@ def test_json_of_two_scenes_is_a_list_in_their_order(capsys, tmp_path):
     ],
 )
 def test_a_faulty_option_is_refused_with_status_two_and_its_reason(capsys, still, options, sentence):
+    """Of ``crosscheck run``; the reason is on standard error, and standard output stays empty."""
     status, out, err = run_main(capsys, "run", still, "--engine", FAKE, "--json", *options)
     assert status == 2, (status, err)
     assert out == "", out
@@ -141,6 +142,7 @@ def test_a_faulty_option_is_refused_with_status_two_and_its_reason(capsys, still
 
 
 def test_every_fault_of_a_scene_file_is_reported_with_its_line(capsys, tmp_path):
+    """Gravity is in line 2 and the body's mass in line 5 of its table, which begins in line 3."""
     path = tmp_path / "bad.toml"
     path.write_text(
         'name = "bad"\ngravity = [0, 0]\n[[body]]\nname = "a"\nmass = -1.0\nposition = [0, 0, 0]\n'
@@ -168,6 +170,7 @@ def test_a_velocity_that_contradicts_a_joint_is_reported_once_with_the_joints_li
 
 
 def test_an_unknown_scene_is_refused_with_the_known_names(capsys):
+    """Of which four_bar is one."""
     status, _, err = run_main(capsys, "run", "no_such_scene", "--engine", FAKE)
     assert status == 2 and "unknown scene 'no_such_scene'" in err and "four_bar" in err, err
 
@@ -210,6 +213,7 @@ def test_run_takes_a_method_and_a_tolerance_that_no_sweep_offers(capsys, still):
 
 
 def test_an_unknown_method_is_refused_with_the_known_ones(capsys, still):
+    """mbref has the method taylor and formulations such as alf-dual with projection, but none lm9."""
     status, _, err = run_main(capsys, "run", still, "--engine", "mbref", "--method", "lm9+none")
     assert status == 2, (status, err)
     assert "unknown method or setting 'lm9+none'; known: 'taylor', " in err, err
@@ -256,12 +260,14 @@ def test_error_of_an_adapter_that_cannot_be_imported_names_its_file_and_line(cap
 
 
 def test_certify_without_python_flint_says_how_to_install_it(capsys, monkeypatch):
+    """No package is found; the exit status is 2."""
     monkeypatch.setattr(certifying.importlib.util, "find_spec", lambda name: None)
     status, _, err = run_main(capsys, "certify", "heavy_top")
     assert status == 2 and err.endswith("not installed: pip install python-flint\n"), err
 
 
 def test_certify_refuses_an_output_file_in_a_missing_folder(capsys, tmp_path):
+    """Before it computes for hours: exit status 2 and the folder's name."""
     pytest.importorskip("flint", reason="python-flint is the extra `certify`")
     status, _, err = run_main(capsys, *CERTIFY, str(tmp_path / "nowhere" / "table.json"))
     assert status == 2 and err.endswith(f"argument --out: there is no folder {tmp_path / 'nowhere'}\n"), err

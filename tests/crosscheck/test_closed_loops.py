@@ -76,6 +76,7 @@ def test_sentence_and_command_of_a_run_state_its_setting_and_the_sentence_its_er
 
 
 def test_sentence_on_a_refusal_names_its_reason_and_no_command_repeats_it() -> None:
+    """The engine lacks hinges; its only record is the best and the default one, and of no family."""
     cell = matrix([refused()])["mujoco"][FIRST.heading]
     assert cell.best() is cell.defaults() is cell.records[0]
     assert sentence(cell.records[0]) == "refused: no hinge (missing in the engine)"

@@ -64,6 +64,7 @@ def test_rows_and_data_frame_of_a_comparison_have_one_row_a_run(compared):
 
 
 def test_a_comparison_refuses_an_unknown_depth_or_engine():
+    """The errors state the depths quick and whole, and the engine's name."""
     with pytest.raises(RequestError, match="depth: must be quick or whole, got 'deep'"):
         crosscheck.compare(BLOCK, [FAKE], depth="deep")
     with pytest.raises(RequestError, match="unknown engine 'none'"):
@@ -112,11 +113,13 @@ def test_an_exception_in_a_run_is_raised_by_the_study():
 
 
 def test_compare_takes_one_engine_and_one_family_without_a_list():
+    """All rows are of engine "fake" and its family "plain", not of "noisy"."""
     found = crosscheck.compare(BLOCK, FAKE, families="plain", samples=3)
     assert {(row["engine"], row["family"]) for row in found.rows} == {("fake", "plain")}
 
 
 def test_a_comparison_is_saved_as_json_only(compared, tmp_path):
+    """The error names the file a.mp4 and the suffix .json."""
     with pytest.raises(ValueError, match=r"a.mp4: a comparison is saved as .json"):
         compared.save(tmp_path / "a.mp4")
 

@@ -19,7 +19,6 @@ from mbref.scene import Scene
 
 TIMES = np.array([0.0, 0.1, 0.2])
 TERMS = {"rtol": 1e-9, "min_step": 1e-3}
-ROUGH = 1e-2  # of the scene's length, or rad; the error of every setting on the original is less
 WAYS = {  # engine and setting
     "mujoco tuned": ("mujoco", Setting("tuned", {"step": 2e-4, "beta": 100.0, "hard": 1e-7})),
     "pinocchio tuned": ("pinocchio", Setting("tuned", TERMS)),
@@ -104,7 +103,7 @@ def test_an_engine_moves_a_copy_within_four_times_its_error_on_the_original(way:
     """Errors are differences from the judge's motion of the four-bar, changed as the copy. On the original
     they are below 1e-2 of the length or rad; 1e-8 is added for rounding."""
     found = off(way, *changed_by(copy, way))
-    assert own_error(way) < ROUGH
+    assert own_error(way) < 1e-2
     assert found <= WORSE * own_error(way) + FLOOR, f"{copy}: {found:.1e}, original {own_error(way):.1e}"
 
 

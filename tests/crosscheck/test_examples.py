@@ -1,12 +1,17 @@
-"""The engine of the examples as an installed plug-in: it is listed, right, and passes the suite."""
+"""What crosscheck exports, and the engine of the examples as an installed plug-in."""
 
+import ast
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import crosscheck
+from crosscheck import engine
 from crosscheck.cli.commands import main
 from crosscheck.engine import ENTRY_POINTS, engine_names
 from crosscheck.judge.metrics import measure
@@ -69,3 +74,41 @@ def test_verify_passes_the_tiny_plug_in_and_lists_the_spatial_scene_that_it_refu
     assert main(["verify", "tiny", "--scene", scene, "--scene", "spatial_slider_crank"]) == 0
     out = capsys.readouterr().out
     assert re.search(r"\b0 fail", out) and "cannot: spatial_slider_crank" in out, out
+
+
+@pytest.mark.parametrize("name", crosscheck.__all__)
+def test_every_exported_name_exists_and_is_listed(name: str) -> None:
+    """Names of ``crosscheck.__all__`` are imported at their first use; ``dir`` lists them before."""
+    assert getattr(crosscheck, name) is not None and name in dir(crosscheck)
+
+
+def test_crosscheck_exports_functions_beside_its_modules_engine_and_study() -> None:
+    """`find_engine` and `run_study` are exported under other names than their modules."""
+    assert crosscheck.find_engine("mbref").name == "mbref"
+    assert crosscheck.run_study is crosscheck.study.study
+
+
+def test_importing_crosscheck_imports_neither_numpy_nor_numba_nor_mbref() -> None:
+    """A new process prints the packages that ``import crosscheck`` has loaded."""
+    code = "import sys, crosscheck; print(sorted({m.partition('.')[0] for m in sys.modules}))"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert "'numpy'" not in loaded and "'numba'" not in loaded and "'mbref'" not in loaded, loaded
+
+
+def test_an_engine_in_the_working_directory_is_found(tmp_path, monkeypatch) -> None:
+    """The path of modules has no entry "" for the working directory, as in an installed program."""
+    (tmp_path / "beside_me.py").write_text("from crosscheck.engines.mbref import ENGINE\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [path for path in sys.path if path])
+    assert engine.engine("beside_me:ENGINE").name == "mbref"
+
+
+def test_the_example_engine_imports_from_crosscheck_engine_alone() -> None:
+    """Statements ``from … import`` name this module only; other imports are numpy and the standard
+    library."""
+    found = {
+        n.module
+        for n in ast.walk(ast.parse((TINY / "tiny_engine.py").read_text()))
+        if isinstance(n, ast.ImportFrom)
+    }
+    assert found == {"crosscheck.engine"}, found

@@ -18,12 +18,6 @@ from tests.crosscheck.tree_scenes import INERTIA, body, driven, every_joint
 
 SIDEWAYS = (0.6, 0.0, 0.8)  # an axis along no coordinate axis
 TURNED = (0.3, -0.5, 0.8)  # rotation vector, rad
-# measured errors
-ACCELERATION = 2.7e-8  # of accelerations / the largest acceleration
-TURNING = 8.2e-10  # rad, of a body on a hinge
-TUMBLING = 6.1e-10  # of a free body, relative to the scene's length or in rad
-BEFORE = 7.2e-6  # of a run before a singular position, relative to the scene's length or in rad
-OPEN = (5.7e-14, 2.3e-12)  # of closures: m or rad, and their rates
 
 
 def run(scene: Scene, times: np.ndarray, family: str, step: float) -> Trajectory:
@@ -113,7 +107,7 @@ def test_exudyn_gives_the_true_accelerations():
     for key in ("acceleration", "angular_acceleration"):
         off = np.abs(getattr(trajectory, key) - getattr(exact, key)).max()
         scale = np.abs(getattr(exact, key)).max()
-        assert off < MARGIN * ACCELERATION * scale, f"{key} off by {off:.2e} of {scale:.2e}"
+        assert off < MARGIN * 2.7e-8 * scale, f"{key} off by {off:.2e} of {scale:.2e}"
 
 
 @pytest.mark.parametrize("kind", [Revolute, Cylindrical])
@@ -130,7 +124,7 @@ def test_exudyn_swings_a_body_on_a_torsion_spring_beyond_a_turn(kind: type, bodi
     damped = math.sqrt(rate**2 - decay**2)
     swing = np.exp(-decay * times) * (np.cos(damped * times) + decay / damped * np.sin(damped * times))
     off = angle(scene, run(scene, times, "tuned", 5e-3)) - 8.0 * (1 - swing)
-    assert np.abs(np.angle(np.exp(1j * off))).max() < MARGIN * TURNING, "modulo a turn"
+    assert np.abs(np.angle(np.exp(1j * off))).max() < MARGIN * 8.2e-10, "modulo a turn"
 
 
 def test_exudyn_keeps_joints_of_every_kind_closed():
@@ -138,8 +132,8 @@ def test_exudyn_keeps_joints_of_every_kind_closed():
     times the measured 5.7e-14 (of the length, or rad) and 2.3e-12 1/s."""
     for scene in (every_joint(), driven()):
         measured = measure(scene, run(scene, np.linspace(0, 0.2, 6), "tuned", 2.5e-3))
-        assert measured["violation_position"] < MARGIN * OPEN[0], (scene.name, measured)
-        assert measured["violation_velocity"] < MARGIN * OPEN[1], (scene.name, measured)
+        assert measured["violation_position"] < MARGIN * 5.7e-14, (scene.name, measured)
+        assert measured["violation_velocity"] < MARGIN * 2.3e-12, (scene.name, measured)
 
 
 def test_exudyn_tumbles_a_torque_free_body_as_the_truth():
@@ -149,7 +143,7 @@ def test_exudyn_tumbles_a_torque_free_body_as_the_truth():
     top = body("top", (1.0, 2.0, 3.0), TURNED, mass=2.0, **twist)
     scene = Scene(name="top", body=(top,), gravity=(0.0, -9.81, 0.0), duration=1.0)
     measured = measure(scene, run(scene, np.linspace(0, 1, 6), "tuned", 2e-3), truth_for(scene))
-    assert measured["error"] < MARGIN * TUMBLING, measured
+    assert measured["error"] < MARGIN * 6.1e-10, measured
 
 
 def test_exudyns_motion_does_not_depend_on_the_samples():
@@ -185,7 +179,7 @@ def test_exudyns_trapezoidal_rule_ends_at_a_singular_position_with_right_samples
     assert abs(trajectory.t_end - singular) < 10 * 1e-4, trajectory.t_end
     assert trajectory.times[-1] == pytest.approx(0.06), trajectory.times
     measured = measure(scene, trajectory, truth_for(scene))
-    assert measured["error"] < MARGIN * BEFORE, measured
+    assert measured["error"] < MARGIN * 7.2e-6, measured
 
 
 def test_exudyns_static_analysis_ends_before_a_singular_pose():

@@ -1,13 +1,32 @@
-"""The judge's joint equations / finite differences of themselves, and motions put into poses."""
+"""The judge's joint equations, lengths, start velocities and counts of rows / differences and sums by
+hand."""
+
+import math
+from typing import Any
 
 import numpy as np
 import pytest
 
+import mbref
 from crosscheck.judge import constraints
+from crosscheck.judge.mobility import mobility
 from mbref import rotations
-from mbref.scene import JOINT_TYPES, Body, Driver, Scene, SceneError, Sine, Spherical
+from mbref.scene import (
+    GROUND,
+    JOINT_TYPES,
+    Body,
+    Cylindrical,
+    Distance,
+    Driver,
+    Revolute,
+    Scene,
+    SceneError,
+    Sine,
+    Spherical,
+)
 from mbref.scenes import SCENES
 from tests.crosscheck.truth_scenes import CLOSED
+from tests.helpers.coupled_mechanisms import coupled_loops, gear_pair, pendulum, screw
 
 AXIS = (0.3, -0.5, 0.8)
 SIDE = (0.8, 0.0, -0.3)  # perpendicular to AXIS
@@ -152,3 +171,101 @@ def test_coordinates_of_a_cylindrical_joint_count_its_full_turns(order):
     sign = 1 if order[0] == "ground" else -1
     found = constraints.joint_coordinates(scene, times, poses, frames, spin)["j"]
     assert np.abs(found - sign * np.stack([angle, shift], axis=1)).max() < 100 * ROUNDED
+
+
+O, X, Z = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def body(name: str = "b", *place: float, **parts: Any) -> Body:
+    given = {"mass": 2.0, "inertia": (0.5, 0.3, 0.2), "position": place or O, **parts}
+    return Body(name=name, **given)
+
+
+def scene(*bodies: Body, **parts: Any) -> Scene:
+    return Scene(name="s", body=bodies, **{"gravity": O, **parts})
+
+
+def hinge(name: str = "A", first: str = "ground", second: str = "b", **parts: Any) -> Revolute:
+    return Revolute(name=name, bodies=(first, second), **{"anchor": O, "axis": Z, **parts})
+
+
+def test_scene_length_is_the_largest_distance_of_anchors_and_centres():
+    """Points (3, 4, 0) and the origin; (3, 4, 0) and (0, 0, -6), √(5² + 6²) apart; centres 7 m apart."""
+    bar = Distance(name="D", bodies=("ground", "b"), anchors=((0.0, 0.0, -6.0), (3.0, 4.0, 0.0)))
+    assert constraints.scene_length(scene(body("b", 3.0, 4.0, 0.0), joint=(hinge(),))) == 5.0
+    assert constraints.scene_length(scene(body("b", 3.0, 4.0, 0.0), joint=(bar,))) == math.hypot(5.0, 6.0)
+    assert constraints.scene_length(scene(body("a", 1.0, 0.0, 0.0), body("b", 1.0, 0.0, 7.0))) == 7.0
+
+
+@pytest.mark.parametrize(
+    ("parts", "more", "length"),
+    [
+        ({}, {}, 0.5),
+        ({"velocity": (3.0, 4.0, 0.0)}, {"duration": 2.0}, 5.0 * 2.0),
+        ({}, {"gravity": (0.0, -6.0, 8.0), "duration": 2.0}, 10.0 * 2.0**2 / 2),
+        ({"velocity": X}, {"gravity": (0.0, 0.0, 3.0), "duration": 2.0}, 1.0 * 2.0 + 3.0 * 2.0**2 / 2),
+        ({"velocity": (0.2, 0.0, 0.0)}, {}, 0.5),
+        ({"mass": None, "inertia": None}, {}, 1.0),
+        ({"mass": None, "inertia": None, "velocity": (0.0, 3.0, 0.0)}, {"duration": 0.5}, 3.0 * 0.5),
+    ],
+    ids=["at rest", "thrown", "falling", "thrown and falling", "slow", "massless at rest", "massless thrown"],
+)
+def test_length_of_a_single_body_is_its_way_or_its_radius_of_gyration(parts, more, length):
+    """The larger of the way v t + g t² / 2 over the duration, of 1 s unless given, and the radius of gyration
+    √(0.5 kg m² / 2 kg) = 0.5 m; the radius counts as 1 m for a body without mass."""
+    assert constraints.scene_length(scene(body(**parts), **{"duration": 1, **more})) == pytest.approx(length)
+
+
+PARTS = scene(
+    body("b", 1.0, 0.0, 0.0),
+    body("c", 3.0, 0.0, 0.0),
+    joint=(hinge("A"), Cylindrical(name="C", bodies=("ground", "c"), anchor=O, axis=X)),
+)
+POSE = constraints.initial_poses(PARTS)
+
+
+def test_joint_rates_are_spin_about_and_velocity_along_the_axis():
+    """Body b spins at 3 rad/s about z, hinge A's axis; c has 2 m/s along and 1 rad/s about C's axis x."""
+    rates = constraints.joint_rates(PARTS, *POSE, np.array([O, (2.0, 5.0, 0.0)]), np.array([(0, 0, 3.0), X]))
+    assert rates["A"] == pytest.approx([3.0, 0.0]) and rates["C"] == pytest.approx([1.0, 2.0])
+
+
+def thrown_off_a_hinge(off: float) -> Scene:
+    """A body at 3 m/s, with a part of that speed along the hinge's axis, which the hinge forbids; the judge
+    takes up to 5 % for rounding."""
+    return scene(body("b", 2.0, 0.0, 0.0, velocity=(0.0, 3.0, 3.0 * off)), joint=(hinge(),))
+
+
+def test_initial_velocity_four_percent_off_a_hinge_is_rounded_onto_it():
+    """0.12 m/s along the axis, 4 % of 3 m/s, are taken for rounding, as anything up to 5 % is."""
+    assert constraints.initial_twists(thrown_off_a_hinge(0.04))[0][0] == pytest.approx([0.0, 3.0, 0.0])
+
+
+def test_initial_velocity_six_percent_off_a_hinge_is_refused():
+    """6 % of 3 m/s are 0.18 m/s along the hinge's axis; up to 5 % would count as rounding."""
+    with pytest.raises(SceneError, match=r"joint\[0\] 'A': the given velocities contradict it: off by 0.18"):
+        constraints.initial_twists(thrown_off_a_hinge(0.06))
+
+
+@pytest.mark.parametrize("make", [gear_pair, screw, pendulum, coupled_loops])
+def test_coupling_is_a_constraint_row_and_an_armature_is_none(make):
+    """The judge's rows, redundant rows and freedoms are mbref's, except for rows of rotors: in mbref each
+    armature is a hidden body with six coordinates and as many rows."""
+    scene = make()
+    counts, found = mbref.counts(scene), mobility(scene)
+    rotors = sum(bool(joint.armature) for joint in scene.joint if hasattr(joint, "armature"))
+    assert found.degrees_of_freedom == counts.degrees_of_freedom and found.redundant == counts.redundant
+    assert found.rows == counts.rows - 6 * rotors
+
+
+def test_mobility_of_four_small_scenes_is_as_counted_by_hand():
+    """(rows, redundant rows, freedoms): a free body; a pendulum, by five rows; a boom that a rope holds; a
+    hinge and its copy, whose five rows are redundant."""
+    body = Body(name="rod", mass=1.0, inertia=(0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))
+    free = Scene(name="free", body=[body])
+    hinge = Revolute(name="A", bodies=(GROUND, "rod"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0))
+    rope = Distance(name="rope", bodies=(GROUND, "rod"), anchors=((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
+    assert mobility(free) == (0, 0, 6)
+    assert mobility(free.with_(joint=[hinge])) == (5, 0, 1)
+    assert mobility(free.with_(joint=[hinge, rope])) == (6, 0, 0)
+    assert mobility(free.with_(joint=[hinge, hinge.model_copy(update={"name": "B"})])) == (10, 5, 1)

@@ -54,8 +54,9 @@ def test_momentum_drift_of_turning_in_place_is_relative_to_the_spin():
 
 
 def test_impulses_of_gravity_forces_and_moments_are_no_drift():
-    """Gravity of 1 m/s² gives each body a velocity t, which is a drift over 0.1 if the scene has no gravity;
-    5 N m give body b a spin t; 6 N give body a a velocity of 3 t."""
+    """A motion in which gravity of 1 m/s² gives each body a velocity t has a drift over 0.1 for a scene
+    without gravity, and of rounding with it; so with a spin t of body b by 5 N m, and 3 t of body a by 6
+    N."""
     run = motion()
     fall = np.zeros((3, 2, 3))
     fall[:, :, 2] = -TIMES[:, None]

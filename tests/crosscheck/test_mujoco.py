@@ -158,7 +158,7 @@ def test_projected_mujoco_follows_the_driven_crank() -> None:
 def test_driver_acts_although_mujoco_renumbers_its_rows():
     """A ball joint repeats a point of the driven hinge's axis, so that only rounding moves its three rows.
     MuJoCo leaves them out at angles at which they are exactly zero: the driver's row is 3 or 0. The truth is
-    the driver's angle, 2 t."""
+    the driver's angle, 2 t, to 1e-13 rad."""
     place = (0.1, 0.2, 0.0)
     ball = {"name": "B", "type": "spherical", "bodies": ["ground", "rod"], "anchor": place}
     turning = {"joint": "A", "polynomial": (0.0, 2.0)}

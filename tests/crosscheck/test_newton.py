@@ -110,7 +110,8 @@ def test_featherstone_does_not_close_the_loop():
 @pytest.mark.parametrize("name", ["spatial_slider_crank_gravity", "bennett", "flyball_governor"])
 def test_newton_s_kinematics_give_the_poses_and_velocities_at_the_start(name):
     """Newton's forward kinematics of the adapter's joint coordinates gives the poses of the adapter's bodies,
-    and its joint rates the judge's initial velocities; positions in m, velocities relative to the largest."""
+    and its joint rates the judge's initial velocities. Limits are 1e-6 m and 1e-5 of the largest velocity:
+    roundings of single precision."""
     scene = SCENES[name]()
     mechanism = Mechanism(scene, spanning_tree(scene, JOINTS))
     state = mechanism.model.state()

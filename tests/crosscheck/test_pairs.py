@@ -131,7 +131,6 @@ STEPPERS = {
 DRIVEN = {"a driver and a torsion spring", "two drivers"}
 OF_TORSION = {pair for pair in PAIRS if "torsion" in pair}
 REFUSED = {"bullet": set(), "mjx": DRIVEN, "warp": DRIVEN, "newton": DRIVEN | OF_TORSION}
-SHARE = 0.1  # largest error / effect of the part of a pair with the least effect
 
 
 @pytest.mark.slow
@@ -167,4 +166,4 @@ def test_engines_with_own_steps_move_every_pair(name):
         found = replace(exact, acceleration=None, angular_acceleration=None, **moved)
         effects = [error_series(mechanism, gauss_motion(lost, TIMES), exact).max() for lost in pairs[pair][1]]
         shares[pair] = float(error_series(mechanism, found, exact).max() / min(effects))
-    assert all(share < SHARE for share in shares.values()), shares
+    assert all(share < 0.1 for share in shares.values()), shares

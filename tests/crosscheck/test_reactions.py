@@ -26,7 +26,6 @@ MEASURED = {  # error / the largest reaction, at the finest settings: (unique pa
     "pinocchio": dict.fromkeys(SCENES_COMPARED, (1.2e-11, 6e-12)),
     "exudyn": dict.fromkeys(SCENES_COMPARED, (1.5e-8, 1.1e-8)),
 }
-ROUNDED = 1e-12  # some roundings of 1, or of the largest reaction
 
 
 def run(name: str, scene: Scene) -> Trajectory:
@@ -59,7 +58,7 @@ def test_two_revolute_hinges_share_all_five_components():
     a moment about the axis, to 1e-12."""
     shared = shared_wrenches(door(Revolute), 0.0, *initial_poses(door(Revolute)))
     assert {name: basis.shape[1] for name, basis in shared.items()} == {"low": 5, "high": 5}
-    assert max(np.abs(basis[5]).max() for basis in shared.values()) < ROUNDED
+    assert max(np.abs(basis[5]).max() for basis in shared.values()) < 1e-12
 
 
 @pytest.mark.parametrize("name", SCENES_COMPARED)

@@ -106,13 +106,15 @@ def test_robot_file_gives_its_freedoms_and_leaves_out_dampings_only(name):
 )
 def test_scene_of_a_robot_file_moves_as_mujoco_s_model(name):
     """The judge moves the scene; MuJoCo's masses, forces and rows of the file are integrated finely, and
-    loops that MuJoCo does not read are added to its model here."""
+    loops that MuJoCo does not read are added to its model here. Centres of mass differ by less than 1e-9 of
+    the largest way."""
     found = read(name)
     assert apart(original(name, found), found, END) < SAME
 
 
 def test_error_of_1e_4_in_a_mass_or_armature_shows_in_the_motion():
-    """The mass of a foot or the armature of a motor, times 1.0001: over 100 times the allowed difference."""
+    """A foot's mass or a motor's armature in MuJoCo's model is multiplied by 1.0001. The motion then differs
+    from the scene's by over 1e-7 of the way, 100 times the allowed difference."""
     found = read("ankle.xml")
     model = found.original
     rotor = int(model.joint("left_motor").dofadr[0])

@@ -86,7 +86,8 @@ def test_failed_correction_of_a_state_ends_the_run_with_its_reason() -> None:
 
 
 def test_noise_over_an_interval_near_the_shortest_step_is_stepped_over() -> None:
-    """The interval is 1.005 shortest steps and every slope is noise; 1000 evaluations suffice for it."""
+    """The interval is 1.005 shortest steps and every slope is noise of ±1000: fewer than 1000 evaluations
+    suffice, where one step could be tried again without end."""
     shortest, calls = 1e-3, 0
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Studies: what was run and stored / what a rerun, an interruption or another executor gives."""
+"""Studies: what was run and stored / what a rerun, an interruption, a kill or another executor gives."""
 
 import json
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
@@ -14,6 +14,7 @@ from crosscheck.study.search.offers import default_cases
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Body, Force, Scene
 from mbref.scenes import SCENES
+from tests import kills
 from tests.helpers.fake_engines import FAKE, FAKES
 
 TIMES = np.array([0.0, 0.1, 0.3])
@@ -178,3 +179,22 @@ def test_default_cases_are_the_settings_of_engines_that_map_the_scene():
     assert [(u.scene, u.engine, u.cannot.reason) for u in unable] == [
         (pushed, f"{FAKES}:FAKE", "this fake has no loads")
     ]
+
+
+WHOLE = (200, 20)  # runs, kills
+FEW = {"parents": (30, 2), "children": (6, 1), "workers": (6, 1)}
+MOST_REPEATED = 3  # runs not yet stored when a process is killed: two under way, one being written
+
+
+@pytest.mark.parametrize(
+    ("kind", "runs", "times"),
+    [*((k, *few) for k, few in FEW.items()), *(pytest.param(k, *WHOLE, marks=pytest.mark.slow) for k in FEW)],
+)
+def test_killed_processes_lose_no_record_and_repeat_no_stored_run(kind, runs, times, tmp_path):
+    """A study's parent, an engine's child process or an ensemble's worker gets SIGKILL ``times`` times at
+    random moments; each record is then there once. A kill makes at most one record CRASHED, and at most three
+    runs that were not yet stored (MOST_REPEATED) are repeated."""
+    found = kills.KINDS[kind](runs, times, tmp_path)
+    assert found.kills == times and found.found == found.wanted and not found.twice, f"{kind}: {found}"
+    assert found.crashed <= times, f"{kind}: {found}"
+    assert found.made <= runs + MOST_REPEATED * times, f"{kind}: {found}: stored runs were repeated"
