@@ -2,6 +2,6 @@
 
 import sys
 
-from crosscheck.cli.commands import main
+from crosscheck.cli import main
 
 sys.exit(main())

@@ -60,13 +60,15 @@ def _show(found: Judgement, ignored: Sequence[str]) -> None:
     for c in found.columns:
         begins = "" if c.begins is None else f"{c.begins:.4g} s"
         unit = SI[kind_of(c.name)]
-        table.add_row(c.name, f"{c.largest:.2e} {unit}", f"{c.bound:.2e} {unit}", _verdict(c), begins)
+        until = "" if found.is_whole or not c.is_right else f", to {found.until:.6g} s"
+        table.add_row(c.name, f"{c.largest:.2e} {unit}", f"{c.bound:.2e} {unit}", _verdict(c) + until, begins)
     console().print(table)
     if undetermined := [n for n in found.left if n not in found.uncounted]:
         console().print(f"not determined by the mechanism: {', '.join(undetermined)}", soft_wrap=True)
     _say_uncounted(found.uncounted)
     if found.reason:
-        console().print(f"The reference ends at t = {found.until:.6g} s: {found.reason}", soft_wrap=True)
+        end = f"The reference ends at t = {found.until:.6g} s; later rows are not judged: {found.reason}"
+        console().print(end, soft_wrap=True)
     if any(c.largest > c.allowed for c in found.columns) and not found.explanations:
         console().print(f"{_nothing(found)}.")
     for e in found.explanations:

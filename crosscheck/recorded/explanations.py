@@ -152,14 +152,13 @@ def vector_names(body: str, kind: str) -> list[str]:
 
 
 def with_signs(recorded: Columns, predicted: Columns) -> Columns:
-    """Return predicted columns in which each quaternion has the sign nearer to the recorded one; the sign has
-    no meaning."""
+    """Return predicted columns in which each quaternion, or its components in the table, has the sign nearer
+    to the recorded one; the sign has no meaning."""
     found = dict(predicted)
-    for body in {n[: -len(".orientation.w")] for n in recorded if n.endswith(".orientation.w")}:
-        names = vector_names(body, "orientation")
-        if all(n in recorded for n in names):
-            sign = np.sign(sum(recorded[n] * predicted[n] for n in names))
-            found.update({n: np.where(sign < 0, -1.0, 1.0) * predicted[n] for n in names})
+    for body in {n.rpartition(".")[0] for n in recorded if kind_of(n) == "orientation"}:
+        names = [f"{body}.{axis}" for axis in VECTORS["orientation"] if f"{body}.{axis}" in recorded]
+        sign = np.sign(sum(recorded[n] * predicted[n] for n in names))
+        found.update({n: np.where(sign < 0, -1.0, 1.0) * predicted[n] for n in names})
     return found
 
 

@@ -36,11 +36,12 @@ class Judgement:
     uncounted: tuple[str, ...] = ()  # columns left because full turns between times cannot be counted
     alike: int = 0  # number of changes that explain the difference and that the table does not tell apart
     is_complete: bool = True  # False if the search for explanations ended by its limit of CPU time
+    is_whole: bool = True  # False if the exact motion ends before the table
 
     @property
     def is_right(self) -> bool:
-        """Return whether every column is judged and right."""
-        return bool(self.columns) and all(column.is_right for column in self.columns)
+        """Return whether every column that the judge can determine is right, to the end of the table."""
+        return bool(self.columns) and self.is_whole and all(column.is_right for column in self.columns)
 
     def to_record(self) -> dict[str, Any]:
         """Return the judgement as numbers, lists and text, for JSON."""
@@ -141,14 +142,15 @@ def _judged(
     judged = [n for n in recording.columns if n in whole]
     size = scales(scene, found.motion, whole)
     scale = {n: size[kind_of(n)] for n in judged}
-    recorded = {n: recording.columns[n][known] for n in judged}
+    exact = {n: whole[n][places] for n in judged}
+    recorded = with_signs(exact, {n: recording.columns[n][known] for n in judged})
     rounding = {n: recording.rounding[n][known] if n in recording.rounding else 0 * times for n in judged}
     error = float(found.bound[places].max())
     later = splines(scene, found.motion.times, whole)
     compared = Compared(
         times,
         recorded,
-        with_signs(recorded, {n: whole[n][places] for n in judged}),
+        exact,
         {n: scale[n] * error + rounding[n] for n in judged},
         {n: tolerance * scale[n] for n in judged},
         rounding,
@@ -165,4 +167,5 @@ def _judged(
     left = tuple(n for n in recording.columns if n not in whole)
     turning = tuple(n for n in uncounted(columns) if n in left)
     until, searched = float(times[-1]), (causes.alike, causes.is_complete)
-    return Judgement(errors, causes.explanations, until, found.reason, left, turning, *searched)
+    is_whole = bool(known.all())
+    return Judgement(errors, causes.explanations, until, found.reason, left, turning, *searched, is_whole)

@@ -18,6 +18,8 @@ NUMBER = re.compile(r"[-+]?(\d*)(?:\.(\d*))?(?:[eEdD]([-+]?\d{1,6}))?")
 WHOLE = 15  # significant digits from which on a number has all digits of double precision
 PROVEN, SHARE = 8, 0.7  # least number, and fraction, of cells of full length that prove a column's own format
 FEW = 3  # significant digits below which a column may consist of short numbers, such as 0.2, 0.4, 0.6
+EVIDENCE = 4.0  # -log10 of the probability that double precision numbers look like single precision
+TIES = 1 + 1e-6  # of half a unit; numbers in the middle of two decimals are written as one of them
 EXACT = 300  # decimals of a number that is not rounded
 # relative rounding of numbers in single precision: to binary, and again to the shortest decimal number
 SINGLE = float(np.finfo(np.float32).eps)
@@ -29,12 +31,14 @@ class Cells:
 
     ``places`` is the number of decimals of the last digit (negative for tens), ``digits`` the number of
     significant digits (0 for zero), ``parts`` the digits behind the point as text, ``values`` the numbers.
+    ``has_exponents`` is True if every cell except zeros has an exponent.
     """
 
     places: np.ndarray
     digits: np.ndarray
     parts: tuple[str, ...]
     values: np.ndarray
+    has_exponents: bool
 
     @cached_property
     def keeps_zeros(self) -> bool:
@@ -46,6 +50,13 @@ class Cells:
     def is_regular(self) -> bool:
         """Return whether all cells have one number of decimals or one number of significant digits."""
         return self._has_common_place or self._has_common_digits
+
+    @cached_property
+    def has_one_mantissa(self) -> bool:
+        """Return whether cells with exponents have one number of digits behind the point, as in engineering
+        notation: ``16.510E+00``, ``5.123E-03``; a zero may have another one."""
+        sizes = {len(part) for part, digits in zip(self.parts, self.digits, strict=True) if digits}
+        return self.has_exponents and len(sizes) == 1
 
     @cached_property
     def _has_common_place(self) -> bool:
@@ -101,7 +112,9 @@ def cells_of(column: Sequence[str]) -> Cells:
     """Return the digits of a column of numbers."""
     rows = [parsed(text) or (0, 0, "") for text in column]
     places, digits, parts = zip(*rows, strict=True)
-    return Cells(np.array(places), np.array(digits), parts, np.array([number(text) for text in column]))
+    has_exponents = all(re.search("[eEdD]", text) for text, row in zip(column, rows, strict=True) if row[1])
+    values = np.array([number(text) for text in column])
+    return Cells(np.array(places), np.array(digits), parts, values, has_exponents)
 
 
 def half_units(table: Mapping[str, Sequence[str]]) -> dict[str, np.ndarray]:
@@ -116,17 +129,20 @@ def half_units(table: Mapping[str, Sequence[str]]) -> dict[str, np.ndarray]:
     stripped = {n: c for n, c in columns.items() if n != "time" and not c.keeps_zeros}
     table_strips = any(not c.is_regular for c in columns.values())
     longest = _longest(list(stripped.values()))
-    data = [c for n, c in columns.items() if n != "time"]
-    is_single = _show_single_precision(data)
-    found = {}
+    halves = {}
     for name, cells in columns.items():
-        kept = cells.keeps_zeros or (cells.is_regular and not table_strips)
+        kept = cells.keeps_zeros or cells.has_one_mantissa or (cells.is_regular and not table_strips)
         own = _longest(list(columns.values())) if name == "time" else cells.longest
         shared = (max(longest[0], own[0]), max(longest[1], own[1]))
         places = cells.shown if kept else cells.full(cells.longest if cells.shows_own_format else shared)
-        half = 0.5 * 10.0 ** -np.clip(places, -EXACT, EXACT).astype(float)
-        precision = SINGLE if is_single and _is_single(cells.values) else float(np.finfo(float).eps)
-        found[name] = half + precision * np.abs(cells.values)
+        halves[name] = 0.5 * 10.0 ** -np.clip(places, -EXACT, EXACT).astype(float)
+    shows = {n: _evidence_of_single(cells, halves[n]) for n, cells in columns.items()}
+    evidence = [found for n, found in shows.items() if n != "time"]
+    is_single = min(evidence, default=-np.inf) >= 0.0 and sum(evidence) >= EVIDENCE
+    found = {}
+    for name, cells in columns.items():
+        precision = SINGLE if is_single and shows[name] >= 0.0 else float(np.finfo(float).eps)
+        found[name] = halves[name] + precision * np.abs(cells.values)
     return found
 
 
@@ -136,19 +152,20 @@ def _longest(columns: Sequence[Cells]) -> tuple[int, int]:
     return max(places for places, _ in pairs), max(digits for _, digits in pairs)
 
 
-def _show_single_precision(columns: Sequence[Cells]) -> bool:
-    """Return whether all numbers are single precision numbers, and enough of them have eight or more
-    digits."""
-    long = {x for cells in columns for x in cells.values[cells.digits >= 8].tolist()}
-    return len(long) >= PROVEN and all(_is_single(cells.values) for cells in columns)
+def _evidence_of_single(cells: Cells, half: np.ndarray) -> float:
+    """Return the evidence that numbers (k,) have single precision; -inf if one of them has not.
 
-
-def _is_single(values: np.ndarray) -> bool:
-    """Return whether numbers (k,) are single precision numbers, or the shortest decimals that stand for
-    them."""
-    if np.abs(values).max(initial=0.0) > np.finfo(np.float32).max:
-        return False
-    singles = values.astype(np.float32)
-    if (singles.astype(float) == values).all():
-        return True
-    return all(float(str(single)) == x for single, x in zip(singles, values.tolist(), strict=True))
+    They are the shortest decimals of single precision numbers, or such numbers lie within ``half`` a unit of
+    their last digit. The evidence is minus log10 of the probability that other numbers look so.
+    """
+    if np.abs(cells.values).max(initial=0.0) > np.finfo(np.float32).max:
+        return -np.inf
+    singles = cells.values.astype(np.float32)
+    written = zip(singles, cells.values.tolist(), strict=True)
+    is_shortest = np.array([float(str(single)) == x for single, x in written])
+    is_near = np.abs(singles.astype(float) - cells.values) <= TIES * half
+    if not (is_near | is_shortest).all():
+        return -np.inf
+    unit = np.where(is_near, 2 * half, 10.0 ** -np.clip(cells.places, -EXACT, EXACT).astype(float))
+    distinct = np.unique(cells.values, return_index=True)[1]
+    return float(np.maximum(np.log10(np.spacing(np.abs(singles)) / unit), 0.0)[distinct].sum())

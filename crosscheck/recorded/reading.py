@@ -25,6 +25,8 @@ SHORT = {  # last part of a header → column of the scene
     **{f"w{a}": f"angular_velocity.{a}" for a in "xyz"},
     **{f"q{a}": f"orientation.{a}" for a in "wxyz"},
 }
+# a cell of a number alone, in which a comma may be the decimal point
+FIRST_CELL = re.compile(r"([\"']?)[-+]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?\1\s*([;,\s]|$)")
 INFINITE = ("inf", "infinity")
 ORDERS = ("wxyz", "xyzw")
 LONGEST = 1000  # characters of a cell; the longest decimal number of double precision has 770 digits
@@ -83,12 +85,12 @@ def _digits(numbers: np.ndarray, halves: np.ndarray) -> int:
 
 
 def _cells(path: Path) -> tuple[list[str], list[list[str]]]:
-    """Return headers and cells of a table; the first line that begins with a number is the first row."""
+    """Return headers and cells of a table; the first line whose first cell is a number is the first row."""
     data = path.read_bytes()
     is_wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     text = data.decode("utf-16" if is_wide else "utf-8-sig", errors="replace")
     lines = [line.strip() for line in text.splitlines() if line.strip()]
-    first = next((k for k, line in enumerate(lines) if re.match(r"[\"']?[-+.]?\d", line)), len(lines))
+    first = next((k for k, line in enumerate(lines) if FIRST_CELL.match(line)), len(lines))
     head = lines[first - 1].lstrip("#%! ") if first else ""
     if first == len(lines):
         raise SceneError([f"{path}: has no row of numbers"])
@@ -143,17 +145,17 @@ def _chosen(
 
 def _recognised(header: str, known: Sequence[str]) -> tuple[str, str]:
     """Return column and unit of a header such as ``rod.position.x [mm]`` or ``rod.x``; empty if the header
-    names no column of the scene."""
+    names no column of the scene, or several that differ in the case of letters."""
     match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(/]\s*([\w/ *^]*?)\s*[\])]?)?\s*", header)
     text, unit = (match[1], match[2] or "") if match else (header, "")
     if text.lower() in ("t", "time"):
         return "time", unit
-    for name in known:
-        if text.lower() == name.lower():
-            return name, unit
     body, _, last = text.rpartition(".")
-    full = f"{body}.{SHORT[last.lower()]}" if last.lower() in SHORT else ""
-    return next((name for name in known if name.lower() == full.lower()), ""), unit
+    for full in (text, f"{body}.{SHORT.get(last.lower(), last)}"):
+        alike = [full] if full in known else [name for name in known if name.lower() == full.lower()]
+        if len(alike) == 1:
+            return alike[0], unit
+    return "", unit
 
 
 def _place(where: str, headers: Sequence[str], name: str) -> int:

@@ -278,16 +278,6 @@ def test_explanation_of_exchanged_columns_names_both(scene, pairs, says):
     assert found.sentence == says and found.remains < 1e-9
 
 
-@pytest.mark.slow
-def test_velocities_of_a_late_clock_are_explained_by_its_delay_where_a_load_is_switched() -> None:
-    """Samples are 0.025 s apart; the table begins at the third, at 0.075 s, and is late by 0.3 of this time:
-    0.0225 s. The motor is switched on and off during the table."""
-    table = later(switched_motor(), known("switched_motor"))
-    few = {n: c for n, c in table.items() if n == "time" or n.endswith(("velocity.x", "velocity.y"))}
-    (found,) = crosscheck.judge_motion(switched_motor(), few).explanations
-    assert found.sentence == "all columns: later by 0.0225 s"
-
-
 def test_damping_that_a_table_leaves_out_is_named_as_its_only_cause() -> None:
     """A wheel of 16 rad/s with a damper for 0.2 s; the table has the angle and rate of the free wheel."""
     free = spinning_rod().with_(duration=0.2)
