@@ -43,15 +43,18 @@ def test_output_of_each_command_is_filled_in_under_it():
 
 
 def test_command_that_prints_nothing_is_an_error():
+    """An output cannot be shown; the error has the exit status."""
     with pytest.raises(RuntimeError, match="printed nothing, with exit status 3"):
         filled("```console\n$ exit 3\n```\n")
 
 
 def test_comparison_of_outputs_ignores_numbers_and_sees_units():
+    """``shape`` of a text is equal for outputs that differ in numbers alone."""
     assert shape("0.25 m") == shape("< 1e-13 m") != shape("0.25 mm")
 
 
 def test_output_of_python_is_filled_in_behind_it():
+    """`filled` runs the block of Python and writes what it prints into the block of text after it."""
     text = f"```python\nprint(1 + 1)\n```\n\n{OUTPUT}\n```text\n```\n"
     assert filled(text) == text.replace("```text\n", "```text\n2\n")
     assert blocks(filled(text)) == ["2\n"]

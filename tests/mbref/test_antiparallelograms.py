@@ -11,6 +11,8 @@ from mbref.scene import Driver
 from mbref.simulation.simulate import Limits, simulate
 
 END = 3.0  # s, in which a crank passes one to ten flat positions
+RTOL = 1e-9
+ROUNDING = 1e-11  # m, of pins, whose lengths hold to rounding: 100 times the largest error found
 
 
 def crossing_of_circles(first, long, second, short, beside):
@@ -45,32 +47,33 @@ def four_bar(places, driver=None):
 
 @pytest.mark.parametrize("seed", range(10))
 def test_a_driven_crossed_four_bar_stays_crossed_through_flat_positions(seed):
-    """The closed form ``pins`` has the pins at the crank's angle θ₀ + ω t; the coupler's middle is between
-    them."""
+    """The coupler's middle is midway between its pins, whose places at the crank's angle θ₀ + ω t are known
+    in closed form (``pins``). On the other branch, the parallelogram, it would be elsewhere."""
     crank, frame, angle, rate = drawn(seed)
     times = np.linspace(0.0, END, 31)
-    run = simulate(four_bar(pins(crank, frame, angle), (0.0, rate)), "taylor", times, Limits(rtol=1e-9))
+    run = simulate(four_bar(pins(crank, frame, angle), (0.0, rate)), "taylor", times, Limits(rtol=RTOL))
     places = [pins(crank, frame, angle + rate * t) for t in times]
     expected = np.array([(end + pin) / 2 for _, end, pin, _ in places])
     assert run.outcome.label == "COMPLETED" and run.crossings, run.message
-    assert np.abs(run.position[:, 1, :2] - expected).max() < 1e-11  # m; rounding leaves 9e-14
+    assert np.abs(run.position[:, 1, :2] - expected).max() < ROUNDING
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_swinging_crossed_four_bar_stays_crossed_and_loses_no_energy(seed):
-    """The closed form ``pins`` has the pins at the crank's angle; the coupler's middle is between them."""
+    """The coupler's middle is midway between its pins, whose places at the crank's angle are known in closed
+    form (``pins``). The energy is constant, to 100 rtol."""
     crank, frame, angle, rate = drawn(seed)
     scene = four_bar(pins(crank, frame, angle))
     spun = scene.with_(
         body=(scene.body[0].model_copy(update={"angular_velocity": (0.0, 0.0, rate)}), *scene.body[1:])
     )
-    run = simulate(spun, times=np.linspace(0.0, END, 31), limits=Limits(rtol=1e-9))
+    run = simulate(spun, times=np.linspace(0.0, END, 31), limits=Limits(rtol=RTOL))
     assert run.outcome.label == "COMPLETED" and run.crossings, run.message
     turns = 2 * np.arctan2(run.orientation[:, 0, 3], run.orientation[:, 0, 0])
     places = [pins(crank, frame, turn) for turn in turns]
     expected = np.array([(end + pin) / 2 for _, end, pin, _ in places])
-    assert np.abs(run.position[:, 1, :2] - expected).max() < 1e-11  # m; rounding leaves 8e-14
-    assert np.ptp(run.energy) < 1e-7 * np.abs(run.energy).max()  # 100 times rtol
+    assert np.abs(run.position[:, 1, :2] - expected).max() < ROUNDING
+    assert np.ptp(run.energy) < 100 * RTOL * np.abs(run.energy).max()
 
 
 @pytest.mark.parametrize("method", ["alf-dual+projection", "taylor", "mpi-svd+none", "alf-dual+baumgarte"])
@@ -81,7 +84,6 @@ def test_driving_a_crank_beyond_its_reach_ends_the_run_at_the_dead_position(meth
     pin = crossing_of_circles(end, 0.3, pivot, 0.3, np.array([0.4, -1.0]))
     run = simulate(four_bar((start, end, pin, pivot), (0.0, 2.0)), method, np.linspace(0.0, 2.0, 21))
     dead = np.arccos((0.3**2 + 0.7**2 - 0.6**2) / (2 * 0.3 * 0.7))
-    assert run.outcome.label != "COMPLETED"
     time = (dead - 0.3) / 2.0  # s
     assert run.t_end == pytest.approx(time, abs=1e-6)  # s, in which the crank turns 2e-6 rad
     assert f"the drivers come to a dead position at t = {time:.4g}" in run.message
@@ -90,9 +92,10 @@ def test_driving_a_crank_beyond_its_reach_ends_the_run_at_the_dead_position(meth
 @pytest.mark.parametrize("distance", (-1.3e-5, 2e-5, 5e-5))
 @pytest.mark.parametrize("seed", range(4))
 def test_release_near_the_flat_position_takes_few_steps_and_loses_no_energy(seed, distance):
-    """The crank starts at rest, ``distance`` (rad) from the flat pose; gravity and rigid joints lose no
-    energy. Steps of 1e-4 of the distance would be 92 000 and lose 2e-4 of the energy."""
+    """The crank starts at rest, ``distance`` (rad) from the flat pose. A run whose steps stay as short as the
+    distance takes 92 000 of them in 0.3 s; fewer than 100 are allowed. Rigid joints keep the energy, here to
+    1000 rtol."""
     crank, frame, _, _ = drawn(seed)
-    run = simulate(four_bar(pins(crank, frame, distance)), "taylor", [0.0, 0.3], Limits(rtol=1e-10))
+    run = simulate(four_bar(pins(crank, frame, distance)), "taylor", [0.0, 0.3], Limits(rtol=RTOL / 10))
     assert run.outcome.label == "COMPLETED" and run.cost.steps < 100, (run.message, run.cost.steps)
-    assert np.ptp(run.energy) < 1e-7 * run.kinetic_energy[-1]  # 1000 times rtol
+    assert np.ptp(run.energy) < 1000 * RTOL / 10 * run.kinetic_energy[-1]

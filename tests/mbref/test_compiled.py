@@ -22,7 +22,8 @@ def greedy(n):
 
 @pytest.mark.skipif(PLAIN, reason="without the JIT kernels are plain functions")
 def test_array_is_allocated_only_by_a_kernel_with_the_decorator_allocating():
-    """``total`` has this decorator; ``greedy`` has ``kernel``, and numba refuses to compile it."""
+    """``total`` and ``greedy`` both sum three ones. ``total`` has this decorator; ``greedy`` has ``kernel``,
+    and numba refuses to compile it."""
     assert total(3) == 3.0
     with pytest.raises(numba.core.errors.NumbaError, match="of array passed into"):
         greedy(3)

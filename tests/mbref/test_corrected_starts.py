@@ -57,7 +57,8 @@ def test_missing_velocities_minimise_the_kinetic_energy(count):
 
 
 def test_report_of_a_start_names_corrections_of_more_than_a_billionth():
-    """A start has relative violations of its given positions and velocities; up to 1e-9 nothing is said."""
+    """``off`` has the relative violations of the given positions and velocities of a start. Up to 1e-9 the
+    report is empty."""
     state = dict.fromkeys(("q", "v", "given"), np.zeros(0))
     for off, says in (
         ((1e-10, 1e-10), "^$"),

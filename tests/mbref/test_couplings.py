@@ -7,7 +7,6 @@ from mbref.scene import JOINT_TYPES, SceneError
 from tests.helpers import coupled_mechanisms
 from tests.helpers.coupled_mechanisms import gear_pair, pendulum
 
-BENT = {"ratio": None}
 NO_END = "must not end with 0, which has no influence"
 NO_SLIDE = "is revolute, which has no displacement to be coupled"
 
@@ -30,6 +29,7 @@ def test_counts_list_the_rows_of_couplings_and_rotors():
     ],
 )
 def test_coupling_takes_the_angle_of_a_joint_that_has_one_and_otherwise_the_displacement(kind, coordinate):
+    """The pinion of the gear pair gets a joint of each type; the coupling states no coordinates."""
     axle = JOINT_TYPES[kind].at("A", ("ground", "disc"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
     scene = gear_pair()
     scene = scene.with_(joint=(axle.model_copy(update={"bodies": scene.joint[0].bodies}), scene.joint[1]))
@@ -46,25 +46,23 @@ def test_coupling_takes_the_angle_of_a_joint_that_has_one_and_otherwise_the_disp
         ({"name": "A"}, "coupling[A].name: 'A' is already the name of a joint"),
         ({"joints": ["A"]}, "coupling[teeth].joints: must be two or more names of joints, got ['A']"),
         ({"polynomial": [1.0, 2.0]}, "coupling[teeth].polynomial: or ratio, not both"),
-        ({**BENT, "polynomial": [1.0, 0.0]}, f"coupling[teeth].polynomial: {NO_END}"),
-        ({**BENT, "polynomial": [1.0, "2 m"]}, "coupling[teeth].polynomial[1]: is in rad/rad^2, got '2 m'"),
+        ({"ratio": None, "polynomial": [1.0, 0.0]}, f"coupling[teeth].polynomial: {NO_END}"),
+        (
+            {"ratio": None, "polynomial": [1.0, "2 m"]},
+            "coupling[teeth].polynomial[1]: is in rad/rad^2, got '2 m'",
+        ),
         ({"ratoi": 1.0}, "coupling[teeth].ratoi: is not a known field; did you mean 'ratio'?"),
     ],
 )
 def test_fault_of_a_coupling_is_named_by_its_field(change, fault):
+    """A right coupling `teeth` of the hinges A and B gets one change, which is the only fault reported."""
     entry = {"name": "teeth", "joints": ["A", "B"], "ratio": -0.5} | change
     with pytest.raises(SceneError) as found:
         gear_pair(coupling=[entry])
     assert found.value.faults == [fault]
 
 
-def test_velocities_that_contradict_a_coupling_are_refused():
-    """Both wheels are given 1 rad/s; the ratio is -0.5."""
-    bodies = [body.model_copy(update={"angular_velocity": (0.0, 0.0, 1.0)}) for body in gear_pair().body]
-    with pytest.raises(SceneError, match=r"teeth.*velocities given to bodies violate it"):
-        mbref.simulate(gear_pair().with_(body=tuple(bodies)), times=[0.0])
-
-
 def test_drawing_shows_a_coupling_as_a_dotted_line():
+    """The SVG of a gear pair has strokes of dashes of 1 px in gaps of 5 px; that of a pendulum has none."""
     assert 'stroke-dasharray="1 5"' in mbref.still(gear_pair())
     assert 'stroke-dasharray="1 5"' not in mbref.still(pendulum())

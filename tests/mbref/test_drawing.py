@@ -45,6 +45,7 @@ def texts(picture: str) -> list[str]:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_picture_of_a_scene_names_every_body_and_joint(name):
+    """The texts of the SVG, split at commas, are the names of the scene."""
     scene = SCENES[name]()
     words = {word for text in texts(still(scene)) for word in text.split(", ")}
     assert {body.name for body in scene.body} | {joint.name for joint in scene.joint} <= words
@@ -74,6 +75,7 @@ def overlapping(found: dict[str, np.ndarray]) -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_names_in_a_picture_do_not_overlap(name):
+    """Boxes of the texts, of LETTER px a letter and one LINE_HEIGHT, are apart."""
     found = labels(still(SCENES[name]()))
     assert len(found) > 1 and not overlapping(found)
 
@@ -98,6 +100,7 @@ def crossed(middle: np.ndarray, half: np.ndarray, bar: np.ndarray) -> bool:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_names_of_bodies_stay_clear_of_bars(name):
+    """No bar's middle line comes nearer to the box of a body's name than CLEAR px."""
     picture, scene = still(SCENES[name]()), SCENES[name]()
     half = {body.name: np.array([LETTER * len(body.name), LINE_HEIGHT]) / 2 + CLEAR for body in scene.body}
     found = {word: place[0] for word, place in labels(picture).items() if word in half}
@@ -106,6 +109,7 @@ def test_names_of_bodies_stay_clear_of_bars(name):
 
 
 def test_names_in_an_animation_do_not_overlap_in_any_frame(turning):
+    """The four-bar turns by 1 rad; boxes of names are as in the test of still pictures."""
     found = labels(moving(*turning))
     assert len(found) == len(turning[0].body) + len(turning[0].joint) and not overlapping(found)
 
@@ -132,14 +136,14 @@ def test_joints_at_one_place_share_one_label():
 def test_bars_of_an_animation_keep_their_length_in_every_frame(turning):
     """The mechanism turns as one rigid body: lengths in px change by less than three times the 0.1 px to
     which coordinates are printed, while ends move by more than 50 px."""
-    scene, motion = turning
+    rounding, (scene, motion) = 0.1, turning
     lines = lines_of(ET.fromstring(moving(scene, motion)).find(f"{SVG}g"))
     assert len(lines) == len(scene.body)
     for line in lines:
         values = line.find(f"{SVG}animate").attrib["values"].split(";")
         frames = np.array([[p.split(",") for p in frame.split()] for frame in values], dtype=float)
         length = np.linalg.norm(frames[:, 1] - frames[:, 0], axis=1)
-        assert np.ptp(length) < 0.3 and np.ptp(frames[:, 1, 0]) > 50
+        assert np.ptp(length) < 3 * rounding and np.ptp(frames[:, 1, 0]) > 50
 
 
 def test_animation_of_300_samples_shows_every_third_one():
@@ -150,6 +154,7 @@ def test_animation_of_300_samples_shows_every_third_one():
 
 @pytest.mark.parametrize(("end", "seconds"), [(1.0, 4.0), (7.0, 7.0), (60.0, 12.0)])
 def test_animation_plays_in_real_time_between_four_and_twelve_seconds(end, seconds):
+    """Motions of 1, 7 and 60 s play for 4, 7 and 12 s."""
     timeline = Timeline.of(np.array([0.0, end]))
     assert f'dur="{seconds:g}s"' in timeline.animate("x", ["0", "1"])
 
@@ -158,10 +163,6 @@ def test_samples_at_unequal_intervals_are_shown_at_their_times():
     """Times 1, 1.5 and 3 s are at 0, 1/4 and all of the time shown."""
     element = Timeline.of(np.array([1.0, 1.5, 3.0])).animate("x", ["0", "1", "2"])
     assert 'keyTimes="0;0.25;1"' in element and 'values="0;1;2"' in element
-
-
-def test_constant_value_is_not_animated():
-    assert Timeline.of(np.array([1.0, 1.5])).animate("x", ["0", "0"]) == ""
 
 
 def test_animation_is_replaced_by_a_still_for_readers_who_prefer_reduced_motion(turning):
@@ -207,6 +208,7 @@ def test_only_a_link_with_three_joints_is_drawn_as_a_plate():
     ("name", "right", "up"), [("xy", "x", "y"), ("xz", "x", "z"), ("yz", "y", "z"), ("-90,90", "x", "y")]
 )
 def test_named_view_has_its_two_world_axes_to_the_right_and_up(name, right, up):
+    """The rows of ``axes`` are the directions to the right, up and to the viewer, a right-handed frame."""
     axes = View.parse(name).axes
     assert np.allclose(axes[0], np.eye(3)["xyz".index(right)])
     assert np.allclose(axes[1], np.eye(3)["xyz".index(up)])
@@ -215,11 +217,14 @@ def test_named_view_has_its_two_world_axes_to_the_right_and_up(name, right, up):
 
 @pytest.mark.parametrize("text", ["front", "10", "0,91", "nan,0", "a,b"])
 def test_unknown_view_is_refused(text):
+    """A view is a known name, or two angles of which the second is from -90 to 90 degrees."""
     with pytest.raises(ValueError, match="view: "):
         View.parse(text)
 
 
 def test_planar_mechanism_is_viewed_along_its_normal_and_a_spatial_one_obliquely():
+    """Three points in the plane y = 0, with the axis of a hinge across it, and along it; and three points in
+    an oblique plane."""
     points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 1.0]])
     assert view_of(points, [(0.0, 2.0, 0.0)]) == View.parse("xz")
     assert view_of(points, [(0.0, 0.0, 1.0)]) == View.parse("oblique")
@@ -227,23 +232,22 @@ def test_planar_mechanism_is_viewed_along_its_normal_and_a_spatial_one_obliquely
 
 
 def test_page_shows_all_points_within_its_margins():
-    """Random points in space, a page of at most 600 by 400 px with margins of 40 px."""
+    """Random points in space, a page of at most 600 by 400 px; the margins hold to rounding."""
     points = np.random.default_rng(1).normal(size=(30, 3)) * np.array([5.0, 1.0, 0.1])
     page = Page.around(points, View.parse("oblique"), 600.0, 40.0, 400.0)
-    seen = page.pixels(points)
-    assert (seen >= 40 - 1e-9).all() and (seen <= np.array([page.width, page.height]) - 40 + 1e-9).all()
+    margin, seen = 40 - 1e-9, page.pixels(points)  # px
+    assert (seen >= margin).all() and (seen <= np.array([page.width, page.height]) - margin).all()
 
 
 def test_every_joint_type_is_drawn_by_a_sign_of_its_own():
+    """Pictures of two bodies with a joint of each type between them differ from each other."""
     assert set(SIGNS) == set(JOINT_TYPES)
     ends = {"anchor": X, "anchors": [X, [2.0, 0, 0]], "axis": Z, "axes": [Z, Y]}
     bodies = [{"name": n, "position": [x, 0.2, 0.1]} for n, x in (("a", 0.5), ("b", 1.5))]
     pictures = set()
     for joint in JOINT_TYPES.values():
         made = joint.at("J", ("a", "b"), **ends)
-        picture = still(Scene(name="pair", body=bodies, joint=(made,)), View.parse("oblique"))
-        ET.fromstring(picture)
-        pictures.add(picture)
+        pictures.add(still(Scene(name="pair", body=bodies, joint=(made,)), View.parse("oblique")))
     assert len(pictures) == len(JOINT_TYPES), "two joint types look the same"
 
 

@@ -45,10 +45,11 @@ def test_runs_spread_over_two_processes_equal_single_runs():
 
 
 def test_variants_of_a_slider_crank_move_as_the_closed_form_of_their_lengths():
-    """The slider's place by y_C = sqrt(l² - (r cos θ - d)² - (r sin θ)²) with each variant's r and l."""
-    scenes = list(variants(DRIVEN, VARY[:1], 6))
+    """The slider's place by y_C = sqrt(l² - (r cos θ - d)² - (r sin θ)²) with each variant's r and l, to 100
+    rtol (m). Place B of six variants, and with it both lengths, differs from the built-in one."""
+    scenes, rtol = list(variants(DRIVEN, VARY[:1], 6)), 1e-11
     with ThreadPoolExecutor(1) as one:
-        runs = dict(ensemble(scenes, TIMES, METHOD, Limits(rtol=1e-11), one))
+        runs = dict(ensemble(scenes, TIMES, METHOD, Limits(rtol=rtol), one))
     start = DRIVEN.joint[2].anchor
     for k, scene in enumerate(scenes):
         pin = np.array(scene.joint[1].anchor)
@@ -57,11 +58,12 @@ def test_variants_of_a_slider_crank_move_as_the_closed_form_of_their_lengths():
         theta = DRIVEN.driver[0].polynomial[1] * TIMES
         exact = np.sqrt(l**2 - (r * np.cos(theta) - OFFSET) ** 2 - (r * np.sin(theta)) ** 2)
         off = np.abs(runs[k].position[:, 2, 1] - exact).max()
-        assert off < 1e-9, f"variant {k} with r = {r}: off by {off:.2e} m"  # 100 times rtol
+        assert off < 100 * rtol, f"variant {k} with r = {r}: off by {off:.2e} m"
 
 
 def test_stored_run_is_read_from_the_file_only_for_equal_limits_and_times(tmp_path: Path):
-    """Each computed run adds a line to the file; a run that is read from the file adds none."""
+    """Each computed run adds a line to the file; a run that is read from the file adds none. The finer of two
+    tolerances needs more evaluations of the equations."""
     path = tmp_path / "runs.jsonl"
     with ThreadPoolExecutor(1) as one:
         [(_, rough)] = ensemble([DRIVEN], TIMES, METHOD, Limits(rtol=1e-4), one, path)
@@ -86,8 +88,9 @@ def test_another_process_reports_all_faults_of_a_scene():
 
 
 def test_random_numbers_of_variants_have_the_requested_distributions():
-    """A normal and a uniform number. Of 400: the mean to 4 standard errors, 4 σ / √400; deviation to 15 %;
-    masses in 0.9 to 1.1, near both ends; no correlation above 0.2."""
+    """Of 400 scenes: the mean of place B is 0.1 m within 4 standard errors, 4 σ / √400, its deviation σ = 1
+    mm within 15 %. Masses are uniform in 0.9 to 1.1 kg, and come within 0.01 kg of both ends. The correlation
+    is below 0.2."""
     scenes = list(variants(DRIVEN, VARY, 400, seed=3))
     x = np.array([scene.joint[1].anchor[0] for scene in scenes])
     mass = np.array([scene.body[2].mass for scene in scenes])
@@ -97,6 +100,8 @@ def test_random_numbers_of_variants_have_the_requested_distributions():
 
 
 def test_variant_depends_on_its_seed_and_number_alone_and_differs_in_nothing_else():
+    """The first ten of twenty variants are those of a request for ten. Without joints and bodies all are
+    equal to the original."""
     scenes = list(variants(DRIVEN, VARY, 20, seed=3))
     assert all(s.with_(joint=DRIVEN.joint, body=DRIVEN.body) == DRIVEN for s in scenes)
     assert list(variants(DRIVEN, VARY, 10, seed=3)) == scenes[:10]
@@ -122,6 +127,7 @@ def test_variant_depends_on_its_seed_and_number_alone_and_differs_in_nothing_els
     ],
 )
 def test_command_refuses_a_number_that_cannot_vary(text: str, says: str, capsys: pytest.CaptureFixture):
+    """Faults of the syntax, the interval, the path and the number; nothing is printed on standard output."""
     status = main(["ensemble", "four_bar", "--vary", text, "--workers", "1"])
     printed = capsys.readouterr()
     assert (status, printed.out) == (2, "")
@@ -145,13 +151,14 @@ def test_command_prints_mean_and_deviation_of_single_runs(tmp_path: Path, capsys
     assert len(path.read_text().splitlines()) == 4
 
 
-def test_killed_process_loses_only_the_call_that_killed_it(tmp_path: Path):
-    """The third of eight calls kills its process; the k-th of the others returns 2^k."""
+def test_killed_process_loses_only_the_call_that_killed_it():
+    """The third of eight calls kills its process; the others return the powers of 2 that they compute."""
     with processes(2) as pool:
-        calls = [pool.submit(signal.raise_signal if k == 2 else pow, *_arguments(k)) for k in range(8)]
-        errors = [type(call.exception()).__name__ for call in calls]
-    assert errors == ["NoneType"] * 2 + ["BrokenProcessPool"] + ["NoneType"] * 5
-    assert [call.result() for call in calls if call.exception() is None] == [2**k for k in range(8) if k != 2]
+        before = [pool.submit(pow, 2, k) for k in range(2)]
+        killed = pool.submit(signal.raise_signal, signal.SIGKILL)
+        behind = [pool.submit(pow, 2, k) for k in range(2, 7)]
+        assert type(killed.exception()).__name__ == "BrokenProcessPool"
+        assert [call.result() for call in (*before, *behind)] == [2**k for k in range(7)]
 
 
 @pytest.mark.slow
@@ -163,18 +170,13 @@ def test_interrupt_ends_calls_of_processes_that_still_run():
     assert call.cancelled() or isinstance(call.exception(), BrokenExecutor)
 
 
-def _arguments(k: int) -> tuple:
-    return (signal.SIGKILL,) if k == 2 else (2, k)
-
-
 class Fragile(Executor):
     """An executor whose process dies in each call for which ``kills(scenes)`` is true."""
 
     def __init__(self, kills: Callable[[Sequence[Scene]], bool]):
-        self.kills, self.calls = kills, []
+        self.kills = kills
 
     def submit(self, function, /, scenes, *arguments):
-        self.calls.append(len(scenes))
         future: Future = Future()
         if self.kills(scenes):
             future.set_exception(BrokenExecutor())
@@ -193,7 +195,7 @@ def test_killed_run_is_reported_as_crashed_and_not_stored(tmp_path: Path):
 
 
 def test_runs_before_a_faulty_scene_are_returned():
-    """Scene 25 of 30 has neither masses nor a driver: 0 to 24 are returned before the error."""
+    """Scene 25 of 30 has neither masses nor a driver: the runs of 0 to 24 are returned before the error."""
     scenes = list(variants(DRIVEN, VARY, 30))
     scenes[25] = scenes[25].with_(
         driver=(), body=tuple(body.model_copy(update={"mass": None, "inertia": None}) for body in DRIVEN.body)

@@ -11,10 +11,6 @@ MASS, INERTIA, ARM = 2.0, 0.3, 0.7  # kg, kg m², m: of the pendulum
 POSE = 1e-10  # m, rad, N: Newton's method ends at forces of about 1e-12 N
 
 
-def by_sign(eigenvalues):
-    return sorted(eigenvalues, key=lambda s: -s.imag)
-
-
 def damped_spring() -> Scene:
     """Return a body on a damped torsion spring, which is relaxed at 0.4 rad."""
     spring = {"type": "torsion_spring", "joint": "A", "stiffness": 40.0, "damping": 3.0, "natural_angle": 0.4}
@@ -22,11 +18,12 @@ def damped_spring() -> Scene:
 
 
 def test_a_damped_torsion_spring_has_the_roots_of_its_equation():
-    """J s² + c s + k = 0 about the natural angle. Eigenvalues are exact to rounding."""
-    [each] = equilibria(damped_spring(), starts=1)
+    """(J + m l²) s² + c s + k = 0 about the natural angle; c is 3 N m s/rad and k is 40 N m/rad. The damping
+    ratio is -Re s / |s|."""
+    rounding, [each] = 1e-10, equilibria(damped_spring(), starts=1)  # relative
     roots = np.roots([INERTIA + MASS * ARM**2, 3.0, 40.0])
-    assert np.allclose(by_sign(each.eigenvalues), by_sign(roots), rtol=1e-11)
-    assert each.damping_ratios[0] == pytest.approx(-roots[0].real / abs(roots[0]), rel=1e-10)
+    assert np.allclose(sorted(each.eigenvalues, key=np.imag), sorted(roots, key=np.imag), rtol=rounding)
+    assert each.damping_ratios[0] == pytest.approx(-roots[0].real / abs(roots[0]), rel=rounding)
 
 
 def test_scene_of_an_equilibrium_counts_angles_from_its_pose_and_is_its_own_equilibrium():
@@ -49,14 +46,16 @@ def test_scene_of_an_equilibrium_counts_angles_from_its_pose_and_is_its_own_equi
         ({"body": [{"name": "rod", "position": [ARM, 0.0, 0.0]}]}, r"body\[rod\].mass: is missing"),
     ],
 )
-def test_scenes_driven_round_or_without_freedom_or_mass_have_no_equilibria(change, says):
+def test_scene_that_has_no_equilibria_is_refused_with_the_driver_or_the_mass_that_is_the_cause(change, says):
+    """A driver may accelerate, oscillate, turn about an axis across gravity, or hold the only freedom; a body
+    may have no mass."""
     with pytest.raises(SceneError, match=says):
         equilibria(pendulum().with_(**change))
 
 
 def test_vibration_keeps_the_constraints_and_returns_after_its_period():
-    """A rhombus of 0.5 m swings by 0.05 rad, and its coupler by 0.5 m · 0.05 to second order. The motion
-    begins with the largest displacement, and ends there after a period 1 / f."""
+    """A rhombus of 0.5 m swings by 0.05 rad, so that its coupler moves by 0.5 m · 0.05, to second order. The
+    motion begins at its largest displacement, and ends there after a period 1 / f."""
     [each] = [e for e in equilibria(find_scene("four_bar_gravity"), starts=6) if e.stability == "stable"]
     motion = motion_of_mode(each, 1, amplitude=0.05)
     rounding = 1e-12  # m
@@ -90,6 +89,7 @@ def test_command_modes_prints_the_frequency_of_a_pendulum_and_draws_its_vibratio
 
 
 def test_number_of_an_equilibrium_beyond_those_found_is_refused(tmp_path, capsys):
+    """The pendulum has two equilibria, below and above its hinge; the ninth is asked for."""
     pendulum().save(path := tmp_path / "my.toml")
     assert main(["equilibrium", str(path), "--starts", "2", "--number", "9"]) == 2
     assert "--number: must be from 1 to 2, got 9" in capsys.readouterr().err

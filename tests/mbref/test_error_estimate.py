@@ -51,16 +51,19 @@ def dead() -> Scene:
     return bars.with_(duration=1.0, driver=(Driver(joint="P0", polynomial=(0.0, 2.0)),))
 
 
-def test_sentence_of_an_estimate_states_the_largest_error_and_when_it_exceeds_rtol():
-    """Errors are given at 0, 0.5, 1 and 1.5 s, with rtol 1e-9."""
-    found = estimate(0.0, 5e-10, 3e-9, 2e-9)
-    assert found.largest == 3e-9 and found.exceeds_rtol_from == 1.0 and found.exceeds_from(1e-8) is None
-    assert found.sentence == "largest estimated error: 3.0e-09, above rtol 1e-09 from t = 1 s on"
-
-
-def test_sentence_of_an_estimate_with_a_missing_sample_states_its_reason():
-    found = estimate(0.0, 1e-10, 2e-10, np.nan, reason="the second run ended at t = 1.2 s")
-    assert found.sentence == "largest estimated error: 2.0e-10; the second run ended at t = 1.2 s"
+@pytest.mark.parametrize(
+    ("found", "continuation"),
+    [
+        (estimate(0.0, 5e-10, 3e-9, 2e-9), "3.0e-09, above rtol 1e-09 from t = 1 s on"),
+        (estimate(0.0, 1e-10, 2e-10, np.nan, reason="the second run ended"), "2.0e-10; the second run ended"),
+        (estimate(0.0, 0.1, 0.2, 0.3, rtol=None), "3.0e-01"),
+    ],
+    ids=["above rtol", "last sample missing", "fixed steps, without rtol"],
+)
+def test_sentence_of_an_estimate_states_the_largest_error_and_when_it_exceeds_rtol(found, continuation):
+    """Errors are given at 0, 0.5, 1 and 1.5 s, with rtol 1e-9. None of them is so large that it needs a
+    warning, and those of fixed steps have no rtol to be compared with."""
+    assert found.sentence == f"largest estimated error: {continuation}" and not found.warning
 
 
 @pytest.mark.parametrize(
@@ -74,6 +77,8 @@ def test_sentence_of_an_estimate_with_a_missing_sample_states_its_reason():
     ],
 )
 def test_warning_needs_an_error_above_a_thousand_tolerances_and_a_millionth(rtol, error, warns):
+    """A thousand tolerances are 1e-6, 1e-9 and 1e-2 in the cases; the error of the third is above this, but
+    below a millionth."""
     assert bool(estimate(0.0, 0.0, error, 0.0, rtol=rtol).warning) == warns
 
 
@@ -86,20 +91,16 @@ def test_warning_needs_an_error_above_a_thousand_tolerances_and_a_millionth(rtol
     ],
 )
 def test_warning_states_the_error_its_time_and_a_tighter_tolerance_with_its_error(tighter, says):
-    """``tighter`` has a tolerance that was tried and its largest error. A run whose error falls below a
-    thousand times this tolerance was inaccurate; otherwise the motion is sensitive."""
+    """``tighter`` has a tolerance that was tried and its largest error. With rtol 1e-5, the error is above a
+    thousand rtol from 1 s on. A run whose error falls below a thousand times the tighter tolerance was
+    inaccurate; otherwise the motion is sensitive."""
     assert estimate(0.0, 1e-3, 0.5, 3.1, rtol=1e-5, tighter=tighter).warning == says
-
-
-def test_estimate_of_a_run_in_fixed_steps_has_no_warning():
-    """Such a run has no rtol, with which its errors, up to 0.3, could be compared."""
-    found = estimate(0.0, 0.1, 0.2, 0.3, rtol=None)
-    assert not found.warning and found.sentence == "largest estimated error: 3.0e-01"
 
 
 def test_estimate_is_the_true_error_of_an_oscillation(oscillator):
     """Closed form x = 1 + 0.2 cos 10 t; the length of the mechanism is 1.2 m, from the joint to the mass. The
-    estimate is within a thousandth of the true error, which is a million times the rounding."""
+    estimate is within a thousandth of the true error, which rtol 1e-4 and order 4 make a million times as
+    large as rounding."""
     motion = simulate(oscillator, "taylor[order=4]", limits=Limits(rtol=1e-4))
     assert motion.outcome is Outcome.COMPLETED
     true = np.abs(motion["mass"].position[:, 0] - 1 - 0.2 * np.cos(10 * motion.times)) / 1.2
@@ -115,14 +116,14 @@ def test_message_warns_of_a_sensitive_motion_and_states_the_error_at_a_tighter_t
     found = warned.error_estimate
     assert motion.outcome is warned.outcome is Outcome.COMPLETED and motion.message == ""
     assert warned.message == found.warning and found.warning.startswith("sensitive motion: error about ")
-    assert found.largest > 0.1 and found.tighter is not None and found.tighter[1] < 1e-2 * found.largest
+    assert found.largest > 0.1 and found.tighter[1] < found.largest / 100
     accurate = with_error_estimate(simulate(pendulums, "taylor", rtol=1e-12)).error_estimate
     assert 0.1 < accurate.largest / found.tighter[1] < 10 and accurate.tighter is None
 
 
 def test_estimate_at_the_smallest_tolerance_shows_the_growth_of_rounding_errors(pendulums):
-    """In 8 s of a chaotic motion the rounding of the start grows, here by far more than the factor 20; two
-    runs with one start would not show it."""
+    """In 8 s of a chaotic motion the rounding of the start grows by far more than the factor 20, from the
+    first sample after the start to the last. Two runs from one start would not show it."""
     found = with_error_estimate(simulate(pendulums, "taylor", rtol=1e-15)).error_estimate
     assert found.error[-1] > 20 * found.error[1] > 0
 
@@ -133,8 +134,9 @@ def test_estimate_at_the_smallest_tolerance_shows_the_growth_of_rounding_errors(
     ids=["passes singular positions", "driven, begins at a singular position"],
 )
 def test_motion_at_a_singular_position_has_its_true_error_as_its_estimate(name, duration):
-    """The judge has the true motion of one degree of freedom. The passing motion is off by 4e-10, of which
-    the estimate is 1.02 times as much. The driven one has errors of rounding alone, and so its estimate."""
+    """The judge has the true motion of one degree of freedom. Estimates are within 20 % of its errors: 2 %
+    are found for the passing motion, which is off by 4e-10. The driven one has errors of rounding alone, and
+    so its estimate."""
     rounding = 1e-12  # of the length, or rad; the driven motion has an estimate of 1e-13
     motion = with_error_estimate(simulate(name, duration=duration))
     found, true = motion.error_estimate, relative_error(motion, SCENES[name]())
@@ -142,8 +144,8 @@ def test_motion_at_a_singular_position_has_its_true_error_as_its_estimate(name, 
 
 
 def test_start_of_the_second_run_differs_by_rounding_and_keeps_zeros(pendulums):
-    """Each number x changes by at most 2.5 · 2⁻⁵² |x|, so that zeros stay; more than ten numbers change,
-    equally in each call."""
+    """Each number x changes by one to two roundings, at most 2.5 · 2⁻⁵² |x|, so that zeros stay; more than
+    ten numbers change, equally in each call."""
 
     def numbers(scene: Scene) -> np.ndarray:
         fields = [b.position + b.inertia for b in scene.body] + [j.anchor + j.axis for j in scene.joint]
@@ -155,7 +157,8 @@ def test_start_of_the_second_run_differs_by_rounding_and_keeps_zeros(pendulums):
 
 
 def test_samples_that_the_second_run_does_not_reach_have_no_estimate(dead):
-    """Three samples at t ≥ 2 s are added to a motion that ends at a dead position before."""
+    """The driven motion ends at a dead position before its 101 samples are reached; three samples at t ≥ 2 s
+    are added to it."""
     motion = with_error_estimate(simulate(dead))
     assert 2 < len(motion.times) < 101 and not np.isnan(motion.error_estimate.error).any()
     last = np.repeat([len(motion.times) - 1], 3)
@@ -189,6 +192,7 @@ def test_second_run_ends_at_its_time_limit(pendulums):
 
 
 def test_error_of_a_motion_by_another_engine_cannot_be_estimated(pendulums):
+    """A second run needs mbref; the motion states that MuJoCo made it."""
     motion = replace(simulate(pendulums, duration=0.1), engine="mujoco")
     with pytest.raises(ValueError, match="a motion of mujoco"):
         with_error_estimate(motion)
@@ -227,12 +231,12 @@ def ran(pendulums: Scene, folder, capsys, *options: str) -> str:
 
 
 def test_command_prints_the_estimate_of_its_json_record_and_warns(capsys, pendulums, tmp_path):
-    """The table has the estimate in two digits."""
+    """The table has the estimate in two digits. The pendulums are chaotic, so that rtol 1e-4 leads to large
+    errors."""
     said = " ".join(ran(pendulums, tmp_path, capsys).split())
     record = json.loads(ran(pendulums, tmp_path, capsys, "--json"))["records"][0]
     [printed] = re.findall(r"largest estimated error: ([-+.\de]+)", said)
-    assert float(printed) == pytest.approx(record["error_estimate"]["largest"], rel=0.06)  # two digits
-    assert record["error_estimate"]["largest"] > 0.1
+    assert printed == f"{record['error_estimate']['largest']:.1e}"
     assert "sensitive motion: error about" in said and "sensitive motion" in record["message"]
 
 

@@ -21,6 +21,7 @@ def holder(path):
 
 
 def test_lock_is_held_only_inside_its_with_statement(tmp_path):
+    """``is_held`` asks whether any process has the lock; it makes no file or folder."""
     path = tmp_path / "new folder" / "lock"
     assert not is_held(path) and not path.parent.exists()
     with held(path):
@@ -32,6 +33,7 @@ def test_lock_is_held_only_inside_its_with_statement(tmp_path):
     "end", [lambda process: process.stdin.close(), lambda process: process.kill()], ids=["ends", "killed"]
 )
 def test_lock_of_another_process_is_free_after_it_ends_or_is_killed(end, tmp_path):
+    """``holder`` starts a process that has the lock until its input is closed."""
     with holder(tmp_path / "lock") as process:
         assert is_held(tmp_path / "lock")
         end(process)

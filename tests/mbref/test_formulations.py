@@ -34,34 +34,12 @@ def tolerance(formulation):
     return 2e-8 if formulation.name == "alf" else 6e-13
 
 
-def claims(formulation, redundant):
-    """Return whether a formulation claims to solve systems with redundant rows and dependent columns."""
-    return not formulation.needs_independent_columns and (not redundant or formulation.handles_redundancy)
-
-
-ROWS = [(each, redundant) for each in FORMULATIONS.values() for redundant in (0, 1, 4)]
-CLAIMED = [pytest.param(*case, id=f"{case[0].name}-{case[1]}") for case in ROWS if claims(*case)]
-CLAIMED += [pytest.param(FORMULATIONS["mpi-gs-literal"], 4, id="mpi-gs-literal-4")]
-
-
-@pytest.mark.parametrize(("formulation", "redundant"), CLAIMED)
-def test_formulation_solves_redundant_rows_exactly_if_it_claims_to(formulation, redundant):
-    """The truth is the dense KKT system of the independent rows, and the balance M q̈ + Φ_qᵀ λ = g. A system
-    of 16 rows and 12 columns, as of a driven mechanism, has the independent columns that some need."""
-    size = (16, 12) if formulation.needs_independent_columns else (12, 18)
-    mass, jacobian, force, gamma, exact = system(*size, redundant)
-    status, acceleration, multipliers = solve(formulation, mass, jacobian, force, gamma)
-    assert status == OK
-    error = np.max(np.abs(acceleration - exact))
-    assert error < tolerance(formulation), f"{formulation.name}: acceleration differs by {error:.2e}"
-    balance = np.max(np.abs(mass * acceleration + jacobian.T @ multipliers - force))
-    assert balance < tolerance(formulation), f"{formulation.name}: M q̈ + Φ_qᵀ λ - g = {balance:.2e}"
-
-
 @pytest.mark.parametrize(
-    "formulation", [each for each in FORMULATIONS.values() if claims(each, 0)], ids=lambda each: each.name
+    "formulation",
+    [each for each in FORMULATIONS.values() if not each.needs_independent_columns],
+    ids=lambda each: each.name,
 )
-@pytest.mark.parametrize("factor", [1e-6, 1e6])
+@pytest.mark.parametrize("factor", [1e-6, 1.0, 1e6])
 def test_acceleration_and_reactions_do_not_depend_on_the_length_or_repetition_of_a_row(formulation, factor):
     """The truth is the dense KKT system of the rows as they were: q̈, and reactions Φ_qᵀ λ = g - M q̈. A row
     is repeated if the formulation claims to solve redundant rows."""
@@ -92,7 +70,8 @@ def test_five_iterations_of_a_small_penalty_are_too_few_for_alf_and_enough_for_a
 def test_accelerations_of_a_long_chain_by_alf_dual_are_exact_to_rounding():
     """The start of a chain of ten loops against the judge's closed form. Long chains are ill-conditioned: the
     rounding 1e-16 may be magnified by 1e4."""
+    rounding = 1e-16 * 1e4  # of the largest acceleration
     scene = find_scene("four_bar_chain[10]")
     found = simulate(scene, "alf-dual+none", [0.0]).acceleration
     exact = closed_form(scene).poses(np.zeros(1)).acceleration
-    assert np.abs(found - exact).max() < 1e-12 * np.abs(exact).max()
+    assert np.abs(found - exact).max() < rounding * np.abs(exact).max()

@@ -20,7 +20,6 @@ from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.judge.constraints import scene_length
 from mbref.method import Method
 from mbref.motions.trajectory import Outcome
-from mbref.scene import Driver
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
 
@@ -41,21 +40,6 @@ def difference(scene, method=ORDER_16, rtol=1e-11):
     return np.abs(generic.position - own.position).max() / scene_length(scene)
 
 
-@pytest.mark.parametrize(
-    ("name", "joint"),
-    (("planar_slider_crank", "A"), ("planar_slider_crank", "B"), ("bennett", "R1"), ("bricard", "P0")),
-)
-def test_generated_code_moves_driven_mechanisms_as_the_general_kernels(name, joint):
-    """A driver turns the joint from rest by 3 t² rad."""
-    scene = SCENES[name]()
-    at_rest = (
-        b.model_copy(update={"velocity": (0.0, 0.0, 0.0), "angular_velocity": (0.0, 0.0, 0.0)})
-        for b in scene.body
-    )
-    driver = Driver(joint=joint, polynomial=(0.0, 0.0, 3.0))
-    assert difference(scene.with_(body=tuple(at_rest), driver=(driver,))) <= ROUNDING
-
-
 @pytest.mark.parametrize("seed", (3, 11, 17, 21))
 def test_generated_code_moves_random_mechanisms_without_springs_as_the_general_kernels(seed):
     """``difference`` is of positions by both codes, over the length; their sums have other orders."""
@@ -66,11 +50,11 @@ def test_generated_code_moves_random_mechanisms_without_springs_as_the_general_k
 
 @pytest.mark.parametrize("name", ("bricard", "bennett"))
 def test_generated_code_follows_a_motion_that_turns_back(name):
-    """The projection of the velocities on their first values changes its sign. Generated code uses the power
-    equation, except at low speed, where the motion turns back."""
-    times = np.linspace(0.0, 4.0, 41)
+    """Generated code uses the power equation, except at low speed, where the motion turns back: the
+    velocities, projected on their first values, change their sign. The general kernels are the truth."""
+    times, rtol = np.linspace(0.0, 4.0, 41), 1e-11
     generic, own = (
-        simulate(SCENES[name](), "taylor", times, Limits(rtol=1e-11, code=code))
+        simulate(SCENES[name](), "taylor", times, Limits(rtol=rtol, code=code))
         for code in ("generic", "generated")
     )
     along = (own.velocity * own.velocity[1]).sum(axis=(1, 2))
@@ -81,8 +65,8 @@ def test_generated_code_follows_a_motion_that_turns_back(name):
 @pytest.mark.parametrize("name", (*MECHANISMS, "four_bar", "planar_slider_crank_equal", "four_bar_gravity"))
 def test_runs_by_generated_code_and_general_kernels_agree_in_poses_reactions_and_steps(name):
     """Positions agree to 100 times rounding (m), accelerations and reactions, which singular positions
-    magnify, to 1e-5 of the largest. Numbers of steps may differ by 5 %, or by one a crossing: rounding
-    decides on the step after it."""
+    magnify, to 1e-5 of the largest. Numbers of steps may differ by a twentieth, or by one a crossing:
+    rounding decides on the step after it."""
     times = np.linspace(0.0, 0.2, 5)
     generic, own = (
         simulate(SCENES[name](), ORDER_16, times, Limits(rtol=1e-11, code=code))
@@ -93,7 +77,7 @@ def test_runs_by_generated_code_and_general_kernels_agree_in_poses_reactions_and
     for mine, theirs in ((own.acceleration, generic.acceleration), *_reactions(own, generic)):
         assert np.abs(mine - theirs).max() <= 1e-5 * max(1.0, np.abs(theirs).max())
     apart = abs(generic.cost.steps - own.cost.steps)
-    assert apart <= max(0.05 * generic.cost.steps, len(generic.crossings or ()))
+    assert apart <= max(generic.cost.steps / 20, len(generic.crossings or ()))
 
 
 def _reactions(one, other):
@@ -132,6 +116,6 @@ def test_mbref_runs_without_the_optional_generator_of_code(tmp_path):
     package = Path(mbref.__file__).parent
     shutil.copytree(package, tmp_path / "mbref", ignore=shutil.ignore_patterns("generated", "__pycache__"))
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(tmp_path)}
-    command, kept = [sys.executable, "-P", "-c", WITHOUT], {"capture_output": True, "text": True}
-    done = subprocess.run(command, cwd=tmp_path, env=environment, check=False, **kept)
+    command, texts = [sys.executable, "-P", "-c", WITHOUT], {"capture_output": True, "text": True}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, check=False, **texts)
     assert done.returncode == 0, done.stderr

@@ -1,9 +1,8 @@
-"""Integrators against closed forms, the judge's truth and SciPy's Adams codes."""
+"""Integrators against closed forms, the judge's truth and SciPy's coefficients."""
 
 import numpy as np
 import pytest
 import scipy.integrate
-from scipy.integrate import ode
 from scipy.special import ellipj, ellipk
 
 from crosscheck.study import stability
@@ -69,69 +68,25 @@ def test_dop853_converges_with_order_eight(error, longest):
         error("lm1+none/dop853", np.linspace(0, 4, 3), largest_step=h, largest_turn=9.0, **loose)[0]
         for h in steps
     ]
-    assert abs(slope(steps, found) - 8) < 0.8, f"errors {found} at steps {steps} are not of order 8"
+    assert slope(steps, found) == pytest.approx(8, abs=0.8), f"errors {found} at steps {steps}"
 
 
 @pytest.mark.parametrize("order", [1, 2, 4, 6, 8])
 @pytest.mark.parametrize("error", [oscillator_error, pendulum_error])
 def test_adams_of_a_largest_order_converges_with_one_order_more(error, order):
-    """With local extrapolation, order k converges like order k + 1 in the number of steps, here to 20 %: the
-    order varies in the first steps of a run."""
+    """With local extrapolation, order k converges like order k + 1 in the number of steps, here to a fifth:
+    the order varies in the first steps of a run."""
     runs = [
         error(f"lm1+none/adams[max_order={order}]", np.array([0.0, 5.0]), rtol=rtol)
         for rtol in 10.0 ** -np.arange(4, 7 + min(order, 4), 0.5)
     ]
     errors, steps = [e for e, _ in runs], [cost.steps for _, cost in runs]
-    assert abs(-slope(steps, errors) - (order + 1)) < 0.2 * (order + 1), (
-        f"order {order}: errors {errors} in {steps} steps"
-    )
-
-
-def weight_over_arm(phi, _):
-    return -2 * 9.81 / 2.7 * np.sin(phi)
-
-
-# error of a method; the problem as one equation of second order: acceleration, start, end time, exact end
-REDUCED = {
-    "oscillator": (oscillator_error, lambda x, _: -4 * (x - 0.7), (1.0, 0.0), 20.0, displacement(20.0)),
-    "pendulum": (pendulum_error, weight_over_arm, (np.pi / 2, 0.0), 10.0, pendulum_angle(10.0)),
-}
-
-
-def scipy_run(code, acceleration, start, end, exact, rtol):
-    """Error of one of SciPy's codes at the end, and its evaluations."""
-    calls = []
-
-    def rates(t, y):
-        calls.append(t)
-        return [y[1], acceleration(*y)]
-
-    options = {"method": "adams"} if code == "vode" else {}
-    solver = ode(rates).set_integrator(code, rtol=rtol, atol=rtol, nsteps=100_000, **options)
-    error = abs(solver.set_initial_value(start).integrate(end)[0] - exact)
-    return float(error), len(calls)
-
-
-def evaluations_for(error, runs):
-    """Evaluations at which an error is met: a straight line through log evaluations over log error."""
-    errors, counts = np.log(np.array(runs)).T
-    return float(np.exp(np.polyval(np.polyfit(errors, counts, 1), np.log(error))))
-
-
-@pytest.mark.parametrize("name", REDUCED)
-def test_adams_needs_at_most_a_quarter_more_evaluations_than_scipy_s_codes(name):
-    """Evaluations for an error of 1e-6 against the closed form; LSODA and VODE solve the reduced equation."""
-    error_of, *problem = REDUCED[name]
-    times, tolerances = np.array([0.0, problem[2]]), 10.0 ** -np.arange(4, 12, 2)
-    runs = [error_of("mpi-svd+projection/adams", times, rtol=rtol) for rtol in tolerances]
-    mine = evaluations_for(1e-6, [(error, cost.rhs) for error, cost in runs])
-    for code in ("lsoda", "vode"):
-        theirs = evaluations_for(1e-6, [scipy_run(code, *problem, rtol) for rtol in tolerances])
-        assert mine < 1.25 * theirs, f"{name}: {mine:.0f} evaluations at error 1e-6, {code} {theirs:.0f}"
+    assert -slope(steps, errors) == pytest.approx(order + 1, rel=1 / 5), f"errors {errors} in {steps} steps"
 
 
 @pytest.mark.parametrize("order", [0, 2.5, 13])
 def test_order_of_adams_outside_1_to_12_is_refused(order):
+    """Orders below, between and above the whole numbers from 1 to 12."""
     with pytest.raises(ValueError, match=r"max_order must be 1 to 12"):
         simulate(OSCILLATOR, f"lm1+none/adams[max_order={order}]", [1.0])
 
@@ -155,16 +110,16 @@ def test_error_of_a_long_run_stays_below_a_thousand_tolerances(end, method):
 
 
 def test_run_at_ten_million_radians_a_second_completes_in_2000_steps_and_meets_the_truth():
-    """The first step is 1e-10 of the run; a tolerance divided by its share would be below rounding. The truth
-    is the judge's."""
+    """The truth is the judge's, met to 1000 rtol. Long runs divide the tolerance by their number of steps;
+    the first step, 1e-10 of this run, must not lead to a tolerance below rounding."""
     scene = next(scene for scene in stability.scenes() if scene.name == "speed[1e+07]")
     end = 0.1 * scene.duration  # before its first singular position
-    run = simulate(scene, "alf-dual+projection", [end], Limits(most_steps=2000))
-    assert relative_error(run, scene) < 1e-6  # 1000 times rtol
+    run = simulate(scene, "alf-dual+projection", [end], Limits(rtol=1e-9, most_steps=2000))
+    assert relative_error(run, scene) < 1000 * 1e-9
 
 
 def test_fewer_than_a_tenth_of_the_steps_of_an_accelerating_crank_are_rejected():
-    """The control of the step length is stable: long, rejected steps and short ones do not alternate."""
+    """A stable control of the step length does not alternate between long, rejected steps and short ones."""
     scene, times = SCENES["planar_slider_crank"](), [0.2]
     run = ran(scene, "alf-dual+projection", times, rtol=1e-7)
-    assert run.cost.rejected < 0.1 * run.cost.steps, (run.cost.rejected, run.cost.steps)
+    assert run.cost.rejected < run.cost.steps / 10, (run.cost.rejected, run.cost.steps)

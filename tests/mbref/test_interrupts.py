@@ -33,6 +33,8 @@ def test_interrupt_lost_during_a_compilation_is_raised_at_its_end():
 
 
 def test_interrupt_that_is_not_lost_ends_the_compilation_at_once():
+    """Nothing between the signal and Python's handler suppresses the exception; the line after it does not
+    run."""
     done = []
     with pytest.raises(KeyboardInterrupt), interrupts_kept():
         signal.raise_signal(signal.SIGINT)
@@ -41,6 +43,7 @@ def test_interrupt_that_is_not_lost_ends_the_compilation_at_once():
 
 
 def test_error_of_a_compilation_is_raised_instead_of_a_lost_interrupt():
+    """An interrupt is suppressed, and then a division by zero ends the compilation."""
     with pytest.raises(ZeroDivisionError), interrupts_kept():
         with contextlib.suppress(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
@@ -49,6 +52,7 @@ def test_error_of_a_compilation_is_raised_instead_of_a_lost_interrupt():
 
 
 def test_handler_that_the_program_installed_receives_the_interrupt():
+    """The handler notes the number of the signal and raises nothing."""
     received = []
     signal.signal(signal.SIGINT, lambda number, _: received.append(number))
     with interrupts_kept():

@@ -1,4 +1,4 @@
-"""Motions that drivers prescribe: masses, drivers that agree or contradict; perturbed starts."""
+"""The freedoms that drivers leave, and corrections of perturbed starts."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,8 @@ def test_driver_of_a_straight_four_bar_leaves_no_degree_of_freedom():
 @pytest.mark.parametrize("name", [n for n in SCENES if n != "four_bar_straight"])
 def test_positions_that_are_off_by_millimetres_are_corrected_by_centimetres_at_most(name):
     """Coordinates are moved at random by 1 mm or 1 mrad (standard deviation), which violates constraints by
-    more than 1e-5. Newton's method leaves |Φ| < 1e-10, and moves no coordinate by more than 0.02."""
+    more than 1e-5. Newton's method leaves |Φ| < 1e-10, and moves no coordinate by more than 20 standard
+    deviations, 0.02 m or rad."""
     model = Model(SCENES[name]())
     rng = np.random.default_rng(5)
     perturbed = displaced(model.start(), 1e-3 * rng.normal(size=model.n))

@@ -28,8 +28,9 @@ METHODS = [
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", SCENES)
 def test_no_method_without_projection_completes_on_another_motion(name, method):
-    """A run either ends otherwise or is within twice the larger of 1000 rtol and 1e-6 of the closed form:
-    with a larger difference from a projected run, its outcome is LEFT_MOTION."""
+    """A run that completes is within 2000 rtol, and at least 2e-6, of the judge's closed form: twice the
+    difference from a projected run from which on its outcome is LEFT_MOTION. Other motions are off by more
+    than 0.01."""
     scene, end = SCENES[name]
     for rtol in (1e-5, 1e-9):
         run = simulate(scene, method, np.linspace(0.0, end, 9), Limits(rtol=rtol, most_steps=5_000))
@@ -38,12 +39,13 @@ def test_no_method_without_projection_completes_on_another_motion(name, method):
 
 
 def test_run_that_left_its_motion_ends_at_the_first_wrong_sample():
-    """Without comparison the run goes on, and its error against the closed form passes 1000 rtol there."""
+    """A sample is wrong if it differs from the closed form by more than 1000 rtol. The run without comparison
+    goes on, and has the first such sample where the other run ends."""
     scene, end = SCENES["four_bar"]
-    times = np.linspace(0.0, end, 31)
-    run = simulate(scene, "mpi-gs+none", times, Limits(rtol=1e-6))
-    whole = simulate(scene, "mpi-gs+none", times, Limits(rtol=1e-6, compared=False))
-    left = np.argmax(error_series(scene, whole, closed_form(scene).poses(times)) > 1e3 * 1e-6)
+    times, rtol = np.linspace(0.0, end, 31), 1e-6
+    run = simulate(scene, "mpi-gs+none", times, Limits(rtol=rtol))
+    whole = simulate(scene, "mpi-gs+none", times, Limits(rtol=rtol, compared=False))
+    left = np.argmax(error_series(scene, whole, closed_form(scene).poses(times)) > 1000 * rtol)
     assert left > 0 and run.outcome.label == "LEFT_MOTION" and run.t_end == times[left]
     assert np.array_equal(run.times, times[:left]), "samples end where the run left its motion"
     assert f"by t = {run.t_end:.6g} s; " in run.message
@@ -65,12 +67,12 @@ def test_rank_tolerance_that_drops_independent_rows_ends_as_left_motion():
     run = simulate(scene, "mpi-svd+projection", times, Limits(rank_tolerance=0.1))
     assert run.outcome.label == "LEFT_MOTION"
     sound = simulate(scene, "mpi-svd+projection", times, Limits(rank_tolerance=1e-3))
-    assert relative_error(sound, scene) < 1e-8
+    assert relative_error(sound, scene) < 10 * 1e-9
 
 
 def test_inaccurate_run_in_fixed_steps_completes_because_it_keeps_to_its_motion():
-    """With steps of 0.02 s the error against the closed form is above 1e-6, a thousand times rtol, and far
-    below the length of the mechanism, 1: the run remains on its branch."""
+    """With steps of 0.02 s the error against the closed form is above 1e-6, a thousand times rtol, and below
+    a tenth of the mechanism's length: the run remains on its branch."""
     scene = slider_crank(0.1, 0.3, 0.3, "crank", rate=3.0)
     run = simulate(scene, "mpi-svd+none/rk4[step=2e-2]", [0.5, 1.0])
     assert run.outcome.label == "COMPLETED" and 1e-6 < relative_error(run, scene) < 0.1

@@ -27,21 +27,25 @@ def test_limit_that_is_no_finite_number_in_its_interval_is_refused_by_name(name,
 
 @pytest.mark.parametrize("name", STEPS)
 def test_step_limit_of_zero_which_means_no_limit_is_accepted(name):
+    """A whole number, 0, is stored as the float 0.0."""
     assert getattr(Limits(**{name: 0}), name) == 0.0
 
 
 @pytest.mark.parametrize("value", [0, -1, 1.5, 100.0, 2**63, True, "9", None], ids=repr)
 def test_largest_number_of_steps_that_is_no_positive_whole_number_is_refused(value):
+    """Zero, a negative number, floats, a truth value, a text, nothing, and more than 64 bits hold."""
     with pytest.raises(ValueError, match=r"^most_steps: must be a whole number from 1"):
         Limits(most_steps=value)
 
 
 def test_unknown_kind_of_code_is_refused_with_the_three_known():
+    """Code is generated for a scene, general, or chosen by the program."""
     with pytest.raises(ValueError, match=r"^code: must be one of auto, generic, generated, got 'fast'"):
         Limits(code="fast")
 
 
 def test_numpy_numbers_are_stored_as_python_floats_and_integers():
+    """The limits of numpy's numbers are equal to those of Python's numbers."""
     limits = Limits(rtol=np.float32(0.5), atol=np.int64(1), most_steps=np.int32(7))
     assert [type(x) for x in (limits.rtol, limits.atol, limits.most_steps)] == [float, float, int]
     assert limits == Limits(rtol=0.5, atol=1.0, most_steps=7)
@@ -51,5 +55,6 @@ def test_numpy_numbers_are_stored_as_python_floats_and_integers():
     ("option", "value"), [("--rtol", "5e-324"), ("--rtol", "1"), ("--rtol", "nan"), ("--max-step", "-1")]
 )
 def test_command_refuses_a_limit_by_the_name_of_its_option(option, value, capsys):
+    """`mbref run` ends with status 2; ``--max-step`` is the option of ``largest_step``."""
     assert main(["run", "four_bar", option, value]) == 2
     assert capsys.readouterr().err.startswith(f"{option}: must be ")

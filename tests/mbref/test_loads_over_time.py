@@ -20,11 +20,12 @@ def run(scene: Scene, method: str, times=TIMES) -> mbref.Motion:
 
 
 def test_acceleration_at_the_time_of_switching_is_the_one_afterwards():
-    """A force of 2 N on 2 kg from 0.5 s to 1.5 s: 0, 1, 1 and 0 m/s² at 0, 0.5, 1 and 1.5 s, to rounding."""
+    """A force of 2 N on 2 kg from 0.5 s to 1.5 s: 0, 1, 1 and 0 m/s² at 0, 0.5, 1 and 1.5 s."""
+    rounding = 1e-12  # m/s²
     for method in METHODS:
         motion = run(scenes.pushed(Factor(start=0.5, stop=1.5)), method, [0.0, 0.5, 1.0, 1.5])
         along = motion.acceleration[:, 0] @ AXIS
-        assert np.allclose(along, [0.0, 1.0, 1.0, 0.0], atol=1e-12), method
+        assert np.allclose(along, [0.0, 1.0, 1.0, 0.0], atol=rounding), method
 
 
 def test_step_by_series_crosses_each_polynomial_piece_of_a_table_at_once():
@@ -43,6 +44,7 @@ def test_load_that_begins_to_act_moves_a_body_from_rest():
 
 
 def test_equilibrium_of_a_load_over_time_is_refused():
+    """The torque on the wheel is a sine of time, so that no pose is at rest."""
     with pytest.raises(SceneError, match=r"load\[0\].factor: varies"):
         mbref.equilibria(scenes.wheel())
 
@@ -65,6 +67,8 @@ FAULTS = {
 
 @pytest.mark.parametrize("message", FAULTS)
 def test_faulty_function_of_time_is_refused_by_path_and_line(message, tmp_path):
+    """FAULTS has a factor of a force, in a scene of 2 s, by a part of its refusal; the line is the factor's
+    in the file."""
     text = scenes.pushed(Factor()).to_dict()
     text["load"][0]["factor"] = FAULTS[message]
     path = tmp_path / "slide.toml"
@@ -77,5 +81,6 @@ def test_faulty_function_of_time_is_refused_by_path_and_line(message, tmp_path):
 
 
 def test_force_along_a_joint_that_does_not_slide_is_refused():
+    """The wheel turns on a hinge."""
     with pytest.raises(SceneError, match="only translational, cylindrical joints can carry a joint_force"):
         scenes.wheel().with_(load=[JointForce(joint="J", force=1.0)])

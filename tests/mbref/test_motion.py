@@ -54,6 +54,7 @@ def test_rotation_vector_of_a_universal_joint_is_the_relative_rotation(driven):
 
 
 def test_unknown_body_or_joint_is_refused_with_the_known_ones(crank):
+    """The motion has the bodies crank, rod and slider."""
     with pytest.raises(KeyError, match="no body 'lid'; bodies: crank, rod, slider"):
         crank["lid"]
     with pytest.raises(KeyError, match="no joint 'Z'; joints: A, B"):
@@ -61,6 +62,7 @@ def test_unknown_body_or_joint_is_refused_with_the_known_ones(crank):
 
 
 def test_energy_of_a_motion_without_masses_is_refused_with_the_body_and_is_no_column():
+    """The driven four-bar moves also without masses."""
     scene = find_scene("four_bar")
     bare = scene.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in scene.body))
     motion = simulate(bare, "taylor", [0.0, 0.01])
@@ -70,6 +72,7 @@ def test_energy_of_a_motion_without_masses_is_refused_with_the_body_and_is_no_co
 
 
 def test_saved_motion_is_read_back_equal(crank, tmp_path):
+    """Scene, outcome, cost, the record with all numbers, and the names of columns."""
     crank.save(tmp_path / "run.json")
     again = Motion.load(tmp_path / "run.json")
     assert again.mechanism == crank.mechanism and again.outcome is crank.outcome and again.cost == crank.cost
@@ -90,6 +93,7 @@ def test_file_that_is_no_saved_motion_is_refused(field, crank, tmp_path):
 
 
 def test_csv_file_and_data_frame_hold_the_arrays_of_the_motion(crank, tmp_path):
+    """Columns are named by part, field and axis; their numbers are equal to the bit."""
     crank.to_csv(tmp_path / "run.csv")
     with open(tmp_path / "run.csv", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -106,12 +110,15 @@ def test_csv_file_and_data_frame_hold_the_arrays_of_the_motion(crank, tmp_path):
 
 
 def test_data_frame_without_pandas_names_the_package_to_install(crank, monkeypatch):
+    """None in ``sys.modules`` makes Python's import of pandas fail."""
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ImportError, match="pip install pandas"):
         crank.to_dataframe()
 
 
 def test_plot_has_a_panel_for_each_quantity(crank):
+    """A column, the three columns of a vector, and an angle: positions in one panel with a legend, angles in
+    another."""
     axes = crank.plot("slider.position.x", "rod.position", "A.angle").axes
     assert [a.get_ylabel() for a in axes] == ["position, m", "angle, rad"]
     names = [text.get_text() for text in axes[0].get_legend().get_texts()]
@@ -127,6 +134,8 @@ def test_plot_without_columns_shows_joint_coordinates_and_energy(crank):
 
 
 def test_repr_of_a_motion_is_one_line_and_its_html_an_animation(crank):
+    """Bodies and joints of a motion are shown in fewer than 80 characters. HTML shows quotation marks as
+    entities."""
     assert repr(crank) == (
         "<Motion of 'planar_slider_crank' by mbref taylor: COMPLETED, 21 samples to t = 0.1 s>"
     )
@@ -141,6 +150,7 @@ def test_trajectory_with_its_scene_has_the_energy_of_the_motion(crank):
 
 
 def test_path_changes_one_value_of_a_scene():
+    """``with_`` takes the path of a number of a body, a field of the scene, or one component of a vector."""
     scene = find_scene("planar_slider_crank")
     heavy = scene.with_("body[slider].mass", 2.0)
     assert heavy.body[2].mass == 2.0 and heavy.body[:2] == scene.body[:2] and heavy.joint == scene.joint

@@ -57,8 +57,8 @@ STARTS = {
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("of", STARTS)
 def test_coupled_coordinates_start_by_the_least_displacement_and_move_from_there(of, method):
-    """Least J a² + m b² with b = c + r a: a = -r m c / J' and b = J c / J'. From there a torque or a
-    weight moves them with a constant acceleration."""
+    """The least J a² + m b² with b = c + r a, c the offset, has a = -r m c / J' and b = J c / J'. From there
+    a torque or a weight moves them with the constant acceleration that STARTS gives."""
     make, name, offset, ratio, end, first, second, force = STARTS[of]
     times, inertia = np.linspace(0, end, 11), first + ratio**2 * second
     motion = mbref.simulate(shifted(make, name, offset), method=method, times=times, rtol=1e-13)
@@ -106,8 +106,8 @@ def test_natural_angle_of_a_spring_counts_from_the_pose_in_the_file(offset):
 
 
 def test_ends_of_springs_move_with_their_bodies_into_the_assembled_pose():
-    """The offset of 3 mm lifts the rack by more than 2 mm, and with it the end on the rack, not the end on
-    the ground."""
+    """The offset of 3 mm lifts the rack by more than 0.002 m, and with it the spring's end on the rack, not
+    its end on the ground."""
     spring = {
         "type": "spring",
         "bodies": ["ground", "rack"],

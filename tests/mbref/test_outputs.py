@@ -76,6 +76,7 @@ def test_length_rate_and_force_of_a_spring_follow_from_geometry(sprung):
 
 
 def test_load_of_a_number_that_does_not_exist_is_refused(sprung):
+    """Loads are numbered from 0."""
     with pytest.raises(IndexError, match="no load 3; the scene has 3 loads"):
         sprung.load_at(3)
 
@@ -101,7 +102,7 @@ def test_violation_is_the_distance_by_which_a_body_is_out_of_its_plane(ground):
         moved = getattr(motion, level).copy()
         moved[1, 1, 2] += size
         found = getattr(dataclasses.replace(motion, **{level: moved}).violation, level)
-        assert found == pytest.approx([0.0, size, 0.0], rel=1e-6, abs=ACCURACY), level
+        assert found == pytest.approx([0.0, size, 0.0], abs=ACCURACY), level
     bare = dataclasses.replace(motion, acceleration=None)
     assert bare.violation.acceleration is None and "acceleration_violation" not in bare.columns()
 
@@ -111,9 +112,10 @@ def test_violation_is_the_distance_by_which_a_body_is_out_of_its_plane(ground):
 )
 def test_component_is_determined_where_the_judge_finds_no_open_wrench(name):
     """The judge returns a basis of unit wrenches that may be added to all joints without a change of the
-    motion; a component is open where one of them is above rounding, 1e-6."""
-    scene = find_scene(name)
-    motion = simulate(scene, times=np.array([0.0, 0.003]))
+    motion; a component is open where one of them is above rounding, 1e-6. At the third sample the driven
+    parallelograms are flat: further components are open there."""
+    scene, flat = find_scene(name), np.pi / 2 / 124.8  # s
+    motion = simulate(scene, times=np.array([0.0, 0.003, flat]))
     found = motion.determined_reactions
     for k, t in enumerate(motion.times):
         opened = shared_wrenches(scene, t, motion.position[k], motion.orientation[k])
@@ -121,22 +123,9 @@ def test_component_is_determined_where_the_judge_finds_no_open_wrench(name):
             assert (found[joint][k] == (np.abs(basis).max(axis=1, initial=0.0) < 1e-6)).all(), (joint, t)
 
 
-def test_only_in_plane_reactions_of_a_planar_four_bar_are_determined(capsys, tmp_path):
-    """Four parallel hinges: force x, force y and moment z; three rows more than the motion needs act across.
-    The command diagnose prints them."""
-    hinges = [
-        j.model_dump() | {"type": "revolute", "axis": (0.0, 0.0, 1.0)} for j in find_scene("four_bar").joint
-    ]
-    fields = ("name", "type", "bodies", "anchor", "axis")
-    scene = find_scene("four_bar").with_(joint=[{key: hinge[key] for key in fields} for hinge in hinges])
-    found = simulate(scene, times=[0.0, 0.003]).determined_reactions
-    assert all((mask == [True, True, False, False, False, True]).all() for mask in found.values())
-    scene.save(tmp_path / "plane.toml")
-    assert main(["diagnose", str(tmp_path / "plane.toml"), "--start"]) == 0
-    assert "determined          force x, force y, moment z of A, B, C, D" in capsys.readouterr().out
-
-
 def test_unavailable_column_is_refused_with_its_need_or_a_suggestion(sprung):
+    """The pendulum has no mass (``bare``), or its hinge A has no displacement; other names are misspelt or
+    unknown."""
     massless = sprung.mechanism.body[0].model_copy(update={"mass": None, "inertia": None})
     bare = simulate(sprung.mechanism.with_(body=[massless], load=[]), times=TIMES[:2])
     for motion, name, says in (
@@ -155,11 +144,13 @@ def test_unavailable_column_is_refused_with_its_need_or_a_suggestion(sprung):
 
 
 def test_driver_of_a_joint_that_is_not_driven_is_refused_with_the_driven_ones(sprung):
+    """The pendulum has one joint, A, which is driven."""
     with pytest.raises(KeyError, match="no driver of a joint 'B'; driven joints: A"):
         sprung.driver("B")
 
 
 def test_page_of_outputs_has_a_row_for_every_output():
+    """The table of docs/outputs.md has column, unit, shape and meaning of OUTPUTS, in their order."""
     rows = [f"| `{o.column}` | {o.unit} | {o.shape} | {o.meaning} |" for o in OUTPUTS]
     assert [line for line in PAGE.read_text().splitlines() if line.startswith("| `")] == rows
 
@@ -179,6 +170,7 @@ def test_command_run_prints_and_writes_the_requested_columns(tmp_path, capsys):
 
 
 def test_command_plot_writes_png_and_svg(tmp_path):
+    """The suffix of the file decides; a PNG begins with 0x89 and "PNG"."""
     path, picture = str(tmp_path / "my.toml"), tmp_path / "run.png"
     pendulum().save(path)
     assert main(["plot", path, "A.angle", "--samples", "5", "--out", str(picture)]) == 0
@@ -204,11 +196,12 @@ def test_gif_of_a_short_motion_plays_four_seconds(tmp_path):
 
 @pytest.mark.slow
 def test_animation_is_written_as_mp4(tmp_path):
+    """The first box of an ISO base media file has the type ftyp, at its bytes 4 to 8."""
     pytest.importorskip("imageio_ffmpeg", reason="the extra video writes MP4")
     path = tmp_path / "my.toml"
     pendulum().save(path)
     assert main(["animate", str(path), "--samples", "7", "--out", str(tmp_path / "my.mp4")]) == 0
-    assert (tmp_path / "my.mp4").read_bytes()[4:8] == b"ftyp"  # the first box of ISO base media files
+    assert (tmp_path / "my.mp4").read_bytes()[4:8] == b"ftyp"
 
 
 @pytest.mark.parametrize(
@@ -218,6 +211,7 @@ def test_animation_is_written_as_mp4(tmp_path):
 def test_picture_that_needs_a_missing_library_is_refused_with_the_extra_to_install(
     missing, command, ending, tmp_path, monkeypatch, capsys
 ):
+    """None in ``sys.modules`` makes the import of the library fail; the command ends with status 2."""
     monkeypatch.setitem(sys.modules, missing, None)
     path = tmp_path / "my.toml"
     pendulum().save(path)

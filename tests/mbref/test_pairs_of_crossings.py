@@ -28,8 +28,8 @@ def test_flat_positions_of_two_loops_within_one_step_are_both_recorded(apart, me
     run = simulate(two_rhombi(apart), method, [1.0], Limits(rtol=rtol, code="generic"))
     assert run.outcome.label == "COMPLETED", run.message
     expected = sorted((0.0, apart), reverse=True) + sorted((0.0, -apart))
-    assert len(run.crossings) >= 4
-    assert np.abs(angles(run)[:4] - expected).max() < POSITION
+    assert len(run.crossings) >= len(expected)
+    assert np.abs(angles(run)[: len(expected)] - expected).max() < POSITION
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -37,8 +37,9 @@ def test_flat_positions_of_two_loops_within_one_step_are_both_recorded(apart, me
 def test_second_branch_is_taken_at_the_first_or_second_of_two_crossings_in_a_step(number, method):
     """Up to the crossing of its loop a coupler is parallel to its frame; on the second branch it turns, here
     by more than 0.1 rad. Gravity and rigid joints lose no energy, to 100 rtol."""
-    apart, times = -2e-2, np.linspace(0.0, 0.6, 61)
-    run = simulate(two_rhombi(apart), method, times, Limits(branches={number: 2}, code="generic"))
+    apart, times, rtol = -2e-2, np.linspace(0.0, 0.6, 61), 1e-9
+    limits = Limits(rtol=rtol, branches={number: 2}, code="generic")
+    run = simulate(two_rhombi(apart), method, times, limits)
     assert run.outcome.label == "COMPLETED", run.message
     assert np.abs(angles(run)[:number] - [0.0, apart][:number]).max() < POSITION
     behind = times > run.crossings[number - 1].time
@@ -46,4 +47,4 @@ def test_second_branch_is_taken_at_the_first_or_second_of_two_crossings_in_a_ste
     coupler, frame = (1, 0.0) if number == 1 else (3, apart)
     assert np.abs(turned[~behind, coupler] - frame).max() < POSITION
     assert np.abs(turned[behind, coupler] - frame).max() > 0.1
-    assert np.ptp(run.energy) < 1e-7 * np.abs(run.energy).max()
+    assert np.ptp(run.energy) < 100 * rtol * np.abs(run.energy).max()

@@ -6,7 +6,6 @@ import math
 import multiprocessing
 import os
 import signal
-import time
 from pathlib import Path
 
 import pytest
@@ -30,6 +29,7 @@ def test_line_of_a_record_is_strict_json_and_read_back(tmp_path: Path):
 
 
 def test_last_record_of_a_key_replaces_earlier_ones(tmp_path: Path):
+    """Two records with the key "a" are appended, and the second is read."""
     path = tmp_path / "runs.jsonl"
     for value in (1, 2):
         append(path, {"key": "a", "value": value})
@@ -37,6 +37,7 @@ def test_last_record_of_a_key_replaces_earlier_ones(tmp_path: Path):
 
 
 def test_lines_that_are_no_records_are_reported_by_number_and_kept(tmp_path, capsys):
+    """Text, a key that is no text, NaN, a list, and brackets too deep for a parser, between two records."""
     path = tmp_path / "runs.jsonl"
     lines = [
         '{"key": "a"}',
@@ -65,6 +66,7 @@ def test_only_a_line_cut_short_at_the_end_is_removed(tmp_path: Path):
 
 @pytest.mark.parametrize("text", ["my only copy", "first\nsecond\n", "{}\n", "\x00\xff"], ids=repr)
 def test_file_without_records_is_refused_and_not_touched(text: str, tmp_path: Path):
+    """Text with and without a line end, an empty JSON object, and bytes that are no text."""
     path = tmp_path / "letter.txt"
     path.write_text(text, encoding="latin-1")
     with pytest.raises(RecordsError, match=r"letter\.txt: holds no records"):
@@ -78,6 +80,8 @@ def test_file_without_records_is_refused_and_not_touched(text: str, tmp_path: Pa
 def test_command_refuses_a_file_for_results_that_holds_none_or_cannot_be_written(
     out: str, says: str, tmp_path: Path, capsys, monkeypatch
 ):
+    """`mbref ensemble --out` names a letter, a file in a folder that does not exist, or a folder; the letter
+    stays."""
     monkeypatch.chdir(tmp_path)
     Path("letter.txt").write_text("my only copy")
     few = "--vary gravity[1]=0:1 --count 2 --workers 1 --samples 2 --duration 1e-3"
@@ -110,25 +114,3 @@ def test_write_that_fails_half_way_raises_an_error_and_leaves_whole_lines(tmp_pa
     process.join()
     assert process.exitcode == 7, "the write was to fail"
     assert path.read_text() == '{"key": "a"}\n'
-
-
-def append_until_killed(path: str) -> None:
-    """Append records with the keys 0, 1, 2 …, from the first that the file lacks."""
-    for k in range(len(stored(path)), 1_000_000):
-        append(path, {"key": str(k), "long": "x" * 5000})
-
-
-def test_five_killed_writers_leave_every_record_once_and_in_order(tmp_path: Path):
-    """Each is killed after at least 50 kB; a record has about 5 kB."""
-    path = tmp_path / "runs.jsonl"
-    for _ in range(5):
-        process = multiprocessing.get_context("fork").Process(target=append_until_killed, args=(str(path),))
-        process.start()
-        before = path.stat().st_size if path.exists() else 0
-        while not path.exists() or path.stat().st_size < before + 50_000:
-            time.sleep(0.001)
-        process.kill()
-        process.join()
-    found = stored(path)
-    lines = [json.loads(line)["key"] for line in path.read_text().splitlines()]
-    assert len(found) >= 5 * 50_000 // 6000 and lines == list(found) == [str(k) for k in range(len(found))]

@@ -52,14 +52,16 @@ def test_flat_parallelogram_without_forces_stays_and_no_branch_is_chosen():
 
 def test_method_that_cannot_choose_the_branch_does_not_complete_on_a_wrong_one():
     """The judge's closed form follows the parallelogram; a run completes only within 1000 rtol of it."""
-    scene = flat_parallelogram(5.0)
+    scene, rtol = flat_parallelogram(5.0), 1e-9
     for method in ("mpi-svd+none", "alf+baumgarte"):
-        run = simulate(scene, method, TIMES)
-        assert run.outcome.label != "COMPLETED" or measure(scene, run, closed_form(scene))["error"] < 1e-6
+        run = simulate(scene, method, TIMES, Limits(rtol=rtol))
+        error = measure(scene, run, closed_form(scene))["error"]
+        assert run.outcome.label != "COMPLETED" or error < 1000 * rtol, (method, error)
 
 
 def test_run_with_steps_too_short_for_its_end_is_given_up():
-    """10¹² steps would be needed, and 5 million are allowed: the run ends after fewer than 30 000."""
+    """10¹² steps would be needed, and 5 million are allowed: the run ends as soon as that is seen, after
+    fewer than 30 000 steps."""
     run = simulate("planar_slider_crank", times=[1.0], limits=Limits(largest_step=1e-12))
     assert run.outcome.label == "STEP_FAILED" and run.cost.steps < 30_000
     assert "too short to reach the end" in run.message

@@ -7,7 +7,7 @@ from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import closed_form
 from mbref.scene import Body, Revolute, Scene, TorsionSpring
 from mbref.scenes import find_scene
-from mbref.scenes.four_bar import four_bar_gravity, parallelogram
+from mbref.scenes.four_bar import four_bar_gravity
 from mbref.simulation.simulate import Limits, simulate
 from tests.crosscheck.measured import relative_error
 
@@ -21,16 +21,12 @@ def with_pendulum(scene: Scene) -> Scene:
     return scene.with_(body=(*scene.body, bob), joint=(*scene.joint, joint))
 
 
-@pytest.mark.parametrize(
-    ("name", "crossings"),
-    [("four_bar", 4), ("four_bar_gravity", 3), ("five_bar_gravity", 3), ("planar_slider_crank_heavy", 61)],
-)
-def test_motion_of_one_freedom_passes_all_its_singular_positions_on_the_smooth_branch(name, crossings):
-    """The judge's closed form has one angle by the energy. A driven crank is flat every half turn, 4 times in
-    12.5 rad; swings are flat 3 times in their duration; the heavy crank makes 61 half turns."""
-    scene = find_scene(name)
+def test_heavy_crank_passes_a_singular_position_every_half_turn_as_its_closed_form():
+    """The crank, a flywheel, turns by 191.65 rad, which contains π/2 + k π for k = 0 to 60. The judge's
+    closed form has its angle by the energy, met to ten rtol."""
+    scene = find_scene("planar_slider_crank_heavy")
     run = simulate(scene, "taylor", np.linspace(0.0, scene.duration, 9), Limits(rtol=RTOL))
-    assert relative_error(run, scene) < 10 * RTOL and len(run.crossings) == crossings
+    assert relative_error(run, scene) < 10 * RTOL and len(run.crossings) == 61
 
 
 def test_parallelogram_moves_by_its_closed_form_through_three_crossings_beside_a_free_pendulum():
@@ -42,15 +38,15 @@ def test_parallelogram_moves_by_its_closed_form_through_three_crossings_beside_a
 
 
 def test_samples_just_after_a_crossing_meet_the_closed_form_at_a_loose_tolerance():
-    """1 µs to 50 ms after the crossing, rtol is 1e-4; poses are off by less than a tenth of rtol,
-    accelerations by ten times rtol."""
+    """From 1 µs to 50 ms after the crossing poses are off by less than a tenth of rtol, accelerations by ten
+    rtol of the largest."""
     scene = four_bar_gravity()
-    first = simulate(scene, "taylor", [1.0], Limits(rtol=1e-9)).crossings[0].time
+    first, loose = simulate(scene, "taylor", [1.0], Limits(rtol=RTOL)).crossings[0].time, 1e-4
     times = first + np.geomspace(1e-6, 5e-2, 40)
-    run = simulate(scene, "taylor", times, Limits(rtol=1e-4))
+    run = simulate(scene, "taylor", times, Limits(rtol=loose))
     exact = closed_form(scene).poses(times).acceleration
-    assert relative_error(run, scene) < 1e-5
-    assert np.abs(run.acceleration - exact).max() < 1e-3 * np.abs(exact).max()
+    assert relative_error(run, scene) < loose / 10
+    assert np.abs(run.acceleration - exact).max() < 10 * loose * np.abs(exact).max()
 
 
 @pytest.mark.parametrize("rtol", [1e-3, 1e-4, 3e-5])
@@ -65,13 +61,14 @@ def test_torsion_spring_on_a_crossing_parallelogram_moves_as_its_closed_form(rto
 @pytest.mark.parametrize("name", ("four_bar_gravity", "five_bar_gravity"))
 def test_swing_through_three_flat_positions_takes_at_most_18_steps_and_meets_the_closed_form(name):
     """At the times of the crossings the judge's closed form has all bodies on the x axis. Rounding adds a
-    pole to the series there, which shortens no step. Errors are below ten rtol; 18 steps were found."""
-    scene = find_scene(name)
+    pole to the series there, which must shorten no step: 18 steps are taken, rejected ones included. Errors
+    are below ten rtol."""
+    scene, rtol = find_scene(name), 1e-8
     times = np.linspace(0.0, scene.duration, 11)
-    run = simulate(scene, "taylor[order=22]", times, Limits(rtol=1e-8, code="generic"))
+    run = simulate(scene, "taylor[order=22]", times, Limits(rtol=rtol, code="generic"))
     flat = closed_form(scene).poses(np.array([passed.time for passed in run.crossings])).position
-    assert len(flat) == 3 and np.abs(flat[..., 1]).max() < 10 * 1e-8  # m
-    assert relative_error(run, scene) < 10 * 1e-8 and run.cost.steps + run.cost.rejected <= 18
+    assert len(flat) == 3 and np.abs(flat[..., 1]).max() < 10 * rtol  # m
+    assert relative_error(run, scene) < 10 * rtol and run.cost.steps + run.cost.rejected <= 18
 
 
 @pytest.mark.parametrize("name", ("four_bar", "five_bar"))
@@ -83,29 +80,5 @@ def test_driven_loop_takes_at_most_14_steps_and_samples_at_and_near_a_crossing_a
     times = np.sort(np.append(np.linspace(0.0, scene.duration, 11), first + np.array([-1e-5, 0.0, 1e-5])))
     run = simulate(scene, "taylor", times, Limits(code="generic"))
     assert len(run.crossings) == 4 and run.cost.steps + run.cost.rejected <= 14
-    found = measure(scene, run, closed_form(scene))
-    assert found["error"] < 1e-12 and found["velocity_error"] < 1e-12, found
-
-
-def swung(rate: float) -> Scene:
-    """Return a rhombus under gravity whose crank begins with an angular velocity (rad/s)."""
-    scene = parallelogram(0.6, "swung").with_(gravity=(0.0, -9.81, 0.0))
-    for k, turning in enumerate((-rate, 0.0, -rate)):  # of crank, coupler and rocker
-        scene = scene.with_(f"body[{k}].angular_velocity", (0.0, 0.0, turning))
-    return scene
-
-
-@pytest.mark.parametrize("rate", [1.0, 5.0, 20.0])
-def test_start_faster_by_a_millionth_is_ahead_within_the_bounds_from_the_kinetic_energy(rate):
-    """At each pose a start faster by ε = 1e-6 has 2 ε E₀ more kinetic energy E. It gains ∫ ε E₀ / E dt over a
-    time T, between ε T E₀ / E_greatest and ε T E₀ / E_least; times the speed, it is ahead by that. Margins
-    are a thousandth above, for second order, and one half below."""
-    change, times = 1e-6, np.linspace(0.0, 0.3 if rate < 20.0 else 0.1, 200)
-    slow, fast = (
-        simulate(swung(each), "taylor", times, Limits(rtol=1e-12)) for each in (rate, rate * (1.0 + change))
-    )
-    assert len(slow.crossings) == len(fast.crossings) == 1
-    ahead = np.abs(fast.position - slow.position)[-1].max()
-    moved = change * np.abs(slow.velocity[-1]).max() * times[-1] * slow.kinetic_energy[0]
-    least, greatest = slow.kinetic_energy.min(), slow.kinetic_energy.max()
-    assert 0.5 * moved / greatest < ahead < 1.001 * moved / least
+    found, rounding = measure(scene, run, closed_form(scene)), 1e-12  # relative, or rad
+    assert found["error"] < rounding and found["velocity_error"] < rounding, found

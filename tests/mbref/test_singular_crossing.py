@@ -1,10 +1,12 @@
 """Singular positions are crossed, turned back from or missed as the motion does, or runs end UNDECIDED."""
 
 import math
+from itertools import product
 
 import numpy as np
 import pytest
 
+from crosscheck.conformance.mechanisms.parts import linkage
 from crosscheck.judge.reaction_balance import with_exact_reactions
 from crosscheck.judge.truth import closed_form
 from crosscheck.study import stability
@@ -13,7 +15,6 @@ from mbref.scene import GROUND, Body, Driver, Fixed, Revolute, Scene, Translatio
 from mbref.scenes import find_scene
 from mbref.scenes.five_bar import five_bar, five_bar_gravity
 from mbref.scenes.four_bar import four_bar, four_bar_gravity, parallelogram
-from mbref.scenes.links import about_z, link
 from mbref.scenes.planar_slider_crank import slider_crank
 from mbref.simulation.simulate import Limits, simulate
 from tests.crosscheck.measured import relative_error
@@ -32,7 +33,8 @@ def error_of(scene: Scene, end: float, **limits: object) -> float:
     ("rung", "allowed"), [("mass_ratio[1e+09]", 10 * RTOL), ("mass_ratio[1e+12]", 500 * RTOL)]
 )
 def test_light_crank_turns_through_dead_centres_of_a_heavy_slider(rung, allowed):
-    """At a dead centre rounding is magnified by the ratio of masses, 1e9 or 1e12."""
+    """At a dead centre rounding is magnified by the ratio of masses, 1e9 or 1e12. Errors against the judge's
+    closed form are below 10 and 500 rtol: five times the largest found."""
     scene = next(scene for scene in stability.scenes() if scene.name == rung)
     assert error_of(scene, scene.duration) < allowed
 
@@ -50,22 +52,12 @@ def door(tilt: float, seed: int) -> Scene:
     return Scene(name="door", gravity=turned(0.0, -9.81, 0.0), body=(body,), joint=hinges)
 
 
-@pytest.mark.parametrize("tilt", [1e-3, 1e-5, 1e-6])
-@pytest.mark.parametrize("method", ["taylor", "mpi-svd+none"])
-def test_door_that_tilted_hinges_hold_stays_at_its_place(method, tilt):
-    """Two hinges on different axes leave no degree of freedom. Rounding over the tilt, at least 1e-6 rad,
-    moves it by less than 1e-12 m."""
-    scene = door(tilt, seed=0)
-    run = simulate(scene, method, [0.1, 0.2])
-    assert run.outcome.label == "COMPLETED"
-    assert np.allclose(run.position, scene.body[0].position, rtol=0, atol=1e-12)
-
-
 @pytest.mark.parametrize("seed", [0, 1, 2])
-@pytest.mark.parametrize("tilt", [1e-7, 1e-8, 1e-9, 3e-10])
-def test_door_on_slightly_tilted_hinges_is_held_or_its_run_is_undecided(tilt, seed):
-    """Rounding may turn a held door by the rounding unit over the tilt (rad), and move it by about 1e-12 m at
-    any tilt. Below 1e-8 rad a run may be UNDECIDED at its start instead."""
+@pytest.mark.parametrize("tilt", [1e-3, 1e-5, 1e-7, 1e-8, 1e-9, 3e-10])
+def test_door_on_tilted_hinges_is_held_or_its_run_is_undecided(tilt, seed):
+    """Two hinges on different axes leave no degree of freedom. Rounding may turn a held door by the rounding
+    unit over the tilt (rad), and move it by about 1e-12 m at any tilt. Below 1e-8 rad a run may be UNDECIDED
+    at its start instead."""
     scene = door(tilt, seed)
     run = simulate(scene, "taylor", [0.1, 0.2])
     if tilt < 1e-8 and run.outcome.label == "UNDECIDED":
@@ -108,7 +100,8 @@ def test_flap_on_a_door_that_tilted_hinges_hold_swings_as_on_a_welded_door(tilt)
 
 @pytest.mark.parametrize("inertia", [1e-8, 1e-6])
 def test_small_bead_on_an_arm_swings_without_a_singular_position(inertia):
-    """A pendulum is never singular, however small the bead's inertia (kg m²). It stays 1 m long, to 1e-12."""
+    """A pendulum is never singular, however small the bead's inertia (kg m²). It stays 1 m long, to 1e-12,
+    and keeps its energy, to ten rtol."""
     bead = Body(name="bead", mass=1.0, inertia=(inertia,) * 3, position=(1.0, 0.0, 0.0))
     arm = Revolute(name="J", bodies=(GROUND, "bead"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0))
     scene = Scene(name="bead", gravity=(0.0, 0.0, -9.81), body=(bead,), joint=(arm,))
@@ -123,23 +116,25 @@ def test_small_bead_on_an_arm_swings_without_a_singular_position(inertia):
 def test_swing_that_turns_back_before_the_flat_position_meets_its_closed_form_and_crosses_nothing(
     loop, distance
 ):
-    """A parallelogram released ``distance`` (rad) from the flat pose, on the side where it swings back."""
+    """A parallelogram released ``distance`` (rad) from the flat pose, on the side where it swings back.
+    Errors against the judge's closed form are below ten rtol."""
     scene = SWINGING[loop](-distance)
     run = simulate(scene, "taylor", np.linspace(0.0, 1.5, 9))
     assert relative_error(run, scene) < 10 * RTOL and run.crossings == ()
 
 
-@pytest.mark.parametrize(
-    "rtol", [pytest.param(1e-6, marks=pytest.mark.slow), 1e-9, pytest.param(1e-11, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-11])
 def test_crossings_of_a_chain_flat_in_both_loops_are_all_recorded(rtol):
-    """Ten crossings in 10 s; the determinant keeps its sign at each. The motion is periodic: every second
-    crossing follows after one period, to 1e-4 s."""
-    run = simulate(find_scene("four_bar_chain[2]"), "taylor", np.linspace(0.0, 10.0, 3), Limits(rtol=rtol))
-    times = np.array([crossing.time for crossing in run.crossings])
-    assert run.outcome.name == "COMPLETED" and len(times) == 10
-    assert "singular positions passed: 10" in run.message
-    assert np.abs(times[2:] - times[:-2] - (times[2] - times[0])).max() < 1e-4
+    """Crossings are where the first upright of the judge's closed form is level, to 1000 rtol (m), as many as
+    its height changes sign in 10 s. At each both loops are flat, and the determinant keeps its sign."""
+    scene = find_scene("four_bar_chain[2]")
+    run, exact = simulate(scene, "taylor", [10.0], Limits(rtol=rtol)), closed_form(scene)
+    assert run.outcome.name == "COMPLETED", run.message
+    heights = exact.poses(np.linspace(0.0, 10.0, 2001)).position[:, 0, 1]
+    assert len(run.crossings) == np.count_nonzero(np.diff(np.sign(heights))) > 5
+    level = exact.poses(np.array([crossing.time for crossing in run.crossings])).position[:, 0, 1]
+    assert np.abs(level).max() < 1000 * rtol
 
 
 @pytest.mark.parametrize("loop", SWINGING)
@@ -171,15 +166,15 @@ def test_parallelogram_that_starts_moving_near_the_flat_position_meets_its_close
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6])
 def test_swing_that_turns_back_within_its_tolerance_is_right_or_undecided(rtol):
-    """A motion faster by rtol might cross the flat position, so that at least one of the eight runs is
-    undecided; a run that completes is within 1000 rtol of the closed form."""
+    """Released 1e-9 to 1e-6 rad before the flat position, a motion faster by rtol might cross it, so that at
+    least one of the eight runs is undecided. A run that completes is within 1000 rtol of the closed form."""
     undecided = 0
     for distance in (1e-6, 1e-7, 1e-8, 1e-9):
         for swing in SWINGING.values():
             scene = swing(-distance)
             run = simulate(scene, "taylor", np.linspace(0.0, 1.5, 9), Limits(rtol=rtol))
             if run.outcome.label == "COMPLETED":
-                assert relative_error(run, scene) < 1e3 * rtol
+                assert relative_error(run, scene) < 1000 * rtol
             else:
                 assert run.outcome.label == "UNDECIDED" and "singular position at t = " in run.message
                 undecided += 1
@@ -203,19 +198,19 @@ def test_motion_from_very_near_the_flat_position_is_undecided_at_its_start(loop,
     assert "singular position at t = 0 s" in run.message
 
 
-@pytest.mark.parametrize("gap", [1e-2, 1e-5, 1e-8, 1e-10])
-def test_slider_crank_with_a_longer_rod_turns_past_its_dead_centre_as_its_closed_form(gap):
-    """The rod is longer than the crank by the gap (m), so that branches do not meet, apart by about √gap."""
-    scene = slider_crank(0.308, 0.308 + gap, 0.3, "gap", rate=30.0)
-    assert error_of(scene, 0.25) < RTOL
+LOOSE = 1e-5  # rtol of long steps
 
 
-@pytest.mark.parametrize("gap", [1e-12, 7.4e-10, 2.2e-9, 6.7e-9, 2.0e-8])
-def test_long_steps_of_a_loose_tolerance_do_not_change_branch_over_a_gap(gap):
-    """The rod is longer than the crank by the gap (m). On the other branch the slider would be off by its
-    stroke, 0.6 m; with rtol 1e-5 the error stays below three times this."""
+@pytest.mark.parametrize(
+    ("gap", "rtol"),
+    [*product([1e-2, 1e-5, 1e-8, 1e-10], [RTOL]), *product([1e-12, 7.4e-10, 2.2e-9, 6.7e-9, 2e-8], [LOOSE])],
+)
+def test_slider_crank_with_a_longer_rod_turns_past_its_dead_centre_as_its_closed_form(gap, rtol):
+    """The rod is longer than the crank by the gap (m), so that branches do not meet, apart by about √gap.
+    Long steps of a loose tolerance must not change the branch: the slider would be off by its stroke, 0.6 m.
+    The error is below rtol."""
     scene = slider_crank(0.308, 0.308 + gap, 0.3, "gap", rate=30.0)
-    assert error_of(scene, 0.5, rtol=1e-5) < 3 * 1e-5
+    assert error_of(scene, 0.25, rtol=rtol) < rtol
 
 
 @pytest.mark.parametrize(("gap", "passed"), [(2e-15, 1), (3e-14, 0)])
@@ -230,7 +225,7 @@ def test_only_a_gap_of_the_size_of_rounding_counts_as_a_crossing(gap, passed):
 @pytest.mark.parametrize("inertia", [1e-11, 1e-9])
 def test_small_bead_on_a_cart_keeps_the_energy(inertia):
     """With a bead of 1e-11 kg m², unit rows in the metric of the masses are nearly parallel, which magnifies
-    rounding, 1e-16, by up to 1e11."""
+    rounding, 1e-16, by up to 1e11: to 1e-5 of the kinetic energy."""
     cart = Body(name="cart", mass=1.0, inertia=(1e-2,) * 3, position=(0.0, 0.0, 0.0))
     bead = Body(name="bead", mass=1.0, inertia=(inertia,) * 3, position=(1.0, 0.0, 0.0))
     joints = (
@@ -251,39 +246,18 @@ def test_small_bead_on_a_cart_keeps_the_energy(inertia):
 def test_driven_parallelogram_crosses_from_any_angle_as_its_closed_form(loop, angle, end):
     """Crank and rocker turn by the driver's angle, and the coupler does not turn; in 2.5 s rounding adds up
     over a hundred flat positions: 100 times 1e-13."""
-    assert error_of(DRIVEN[loop](angle), end) < 1e-11
-
-
-def leaning(links: tuple[tuple[float, float], ...], lean: float = 0.0) -> Scene:
-    """Return parallelograms in a chain, on a base line at an angle: cranks of a length and an angle to it
-    (rad). Each rocker is the next one's crank, on an arm of its own."""
-    base, across = about_z(lean), 0.7
-    place = lambda k, length, angle: (  # noqa: E731
-        k * across * math.cos(lean) + length * math.cos(lean + angle),
-        k * across * math.sin(lean) + length * math.sin(lean + angle),
-        0.0,
-    )
-    bodies = [link("bar0", place(0, 0.0, 0.0), place(0, *links[0]), about_z(lean + links[0][1]), links[0][0])]
-    joints = [("A0", GROUND, "bar0", place(0, 0.0, 0.0))]
-    for k, (length, angle) in enumerate(links):
-        here, there, foot = place(k, length, angle), place(k + 1, length, angle), place(k + 1, 0.0, 0.0)
-        bodies.append(link(f"rod{k}", here, there, base, across))
-        bodies.append(link(f"bar{k + 1}", foot, there, about_z(lean + angle), length))
-        joints += [
-            (f"B{k}", f"bar{k}", f"rod{k}", here),
-            (f"C{k}", f"rod{k}", f"bar{k + 1}", there),
-            (f"D{k}", GROUND, f"bar{k + 1}", foot),
-        ]
-    hinges = [Revolute(name=n, bodies=(i, j), anchor=at, axis=(0.0, 0.0, 1.0)) for n, i, j, at in joints]
-    return Scene(name="leaning", body=tuple(bodies), joint=tuple(hinges))
+    assert error_of(DRIVEN[loop](angle), end) < 100 * 1e-13
 
 
 def turned_back(angle: float, distance: float) -> Scene:
-    """Return a parallelogram whose driver stands still at a distance (rad) from the flat position after 0.5
-    s, and has turned it back after 1 s."""
+    """Return a parallelogram of 0.5 m and 0.7 m on a base line at an angle (rad) to the x axis, its crank at
+    this angle to the base. Its driver stands still at a distance (rad) from the flat position after 0.5 s,
+    and has turned it back after 1 s."""
+    base, crank = 0.7 * np.exp(1j * angle), 0.5 * np.exp(2j * angle)
+    pins = [(z.real, z.imag, 0.0) for z in (0j, crank, crank + base, base)]
     turn = 4.0 * (distance - angle)
-    driver = Driver(joint="A0", polynomial=(0.0, turn, -turn))
-    return leaning(((0.5, angle),), angle).with_(driver=(driver,))
+    driver = Driver(joint="P0", polynomial=(0.0, turn, -turn))
+    return linkage("leaning", pins).with_(gravity=(0.0, 0.0, 0.0), driver=(driver,))
 
 
 @pytest.mark.parametrize("distance", [0.0, 1e-9, 1e-8])
@@ -301,8 +275,8 @@ def test_no_run_whose_driver_turns_back_at_the_flat_position_completes_on_anothe
 
 @pytest.mark.parametrize("distance", [1e-6, 1e-4])
 def test_driver_that_turns_back_before_the_flat_position_returns_to_the_start(distance):
-    """The driver is at its first angle after 1 s, and so is the parallelogram, to rounding (m) over the
-    distance; nothing is crossed."""
+    """The driver is at its first angle after 1 s, and so is the parallelogram, to rounding of its
+    coordinates, 1e-14 m, over the distance; nothing is crossed."""
     for angle in np.linspace(0.3, 0.9, 10):
         scene = turned_back(float(angle), distance)
         run = simulate(scene, "taylor", [1.0])
@@ -318,9 +292,10 @@ def test_driver_that_turns_back_before_the_flat_position_returns_to_the_start(di
 )
 def test_accelerations_velocities_and_reactions_near_a_crossing_are_exact(scene):
     """Closed form and reactions of the judge, at distances (rad of the crank) of up to 0.1 on both sides,
-    over the largest value. Accelerations meet it to ten rtol, velocities to rounding. Driven, reactions meet
-    it to 1e-6; free, to rtol over the distance, or over 3e-5 rad if it is nearer. Nearer than 1e-7 rad the
-    judge's rank leaves reactions open: there they are as at the sample before."""
+    over the largest value. Accelerations meet it to ten rtol, velocities to 3e-11 (rounding over a crossing).
+    Driven, reactions meet it to 1e-6; free, to rtol over the distance, or over 3e-5 rad if it is nearer.
+    Nearer than 1e-7 rad the judge's rank leaves reactions open: there they are those of the sample before, to
+    1e-5."""
     (crossing, *_) = simulate(scene, "taylor", [0.3]).crossings
     rate = np.abs(crossing.angular_velocity[0]).max()
     distances = np.array([1e-1, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6, 1e-9])
@@ -328,10 +303,10 @@ def test_accelerations_velocities_and_reactions_near_a_crossing_are_exact(scene)
     run = simulate(scene, "taylor", times)
     exact = with_exact_reactions(scene, closed_form(scene).poses(times))
     scale = np.abs(exact.acceleration).max()
-    assert np.abs(run.acceleration - exact.acceleration).max() < 1e-8 * scale
+    assert np.abs(run.acceleration - exact.acceleration).max() < 10 * RTOL * scale
     assert np.abs(run.velocity - exact.velocity).max() < 3e-11 * np.abs(exact.velocity).max()
     away = np.concatenate([distances, [0.0], distances[::-1]])
-    allowed = 1e-6 if scene.driver else 1e-9 + 1e-9 / np.maximum(away, 3e-5)
+    allowed = 1e-6 if scene.driver else RTOL + RTOL / np.maximum(away, 3e-5)
     beside = away < 1e-7
     for name, true in exact.reactions.items():
         found, largest = run.reactions[name], np.abs(true).max()

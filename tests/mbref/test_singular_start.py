@@ -15,7 +15,7 @@ from tests.helpers import parts
 from tests.helpers.statics import rod
 
 UPRIGHT = math.pi / 2  # rad: crank and rod of equal lengths lie on each other
-RTOL = 1e-9  # limits below are 1, 100 or 1000 of it: errors of the steps of a run add up
+RTOL = 1e-9  # of the runs; limits are 1, 100 or 1000 of it: errors of the steps of a run add up
 ROUNDING = 1e-12  # of poses over the length
 
 
@@ -79,7 +79,8 @@ def falling_parallelogram(rate: float, length: float = 0.3) -> Scene:
 
 @pytest.mark.parametrize("rate", [-1e-6, -1e-3, -1e-2, -0.03, -0.3])
 def test_slow_start_along_the_weight_falls_with_its_energy(rate):
-    """The cranks keep ½ I ω² + m g l sin φ, I = 2 (0.02 + m l² / 4) + m l², and the coupler does not turn."""
+    """The cranks keep ½ I ω² + m g l sin φ, I = 2 (0.02 + m l² / 4) + m l², to rtol, and the coupler does not
+    turn. After 0.4 s they turn faster than 5 rad/s."""
     run = simulate(falling_parallelogram(rate), "taylor", np.linspace(0.0, 0.4, 9))
     assert run.outcome.name == "COMPLETED", run.message
     x, y = run["crank"].position[:, :2].T
@@ -102,8 +103,9 @@ def test_slow_start_against_the_weight_is_undecided_at_its_singular_position():
 
 
 def test_message_of_an_undecided_run_also_states_the_branch_at_its_start():
-    """The swing from rest comes to rest in the other flat position, where neither a tighter tolerance nor
-    another branch helps."""
+    """Released at rest in the flat position, the parallelogram swings through half a turn and comes to rest
+    in the other flat position, after more than 0.1 s. There neither a tighter tolerance nor another branch
+    helps."""
     run = simulate(falling_parallelogram(0.0), "taylor", np.linspace(0.0, 1.0, 9))
     assert run.outcome.name == "UNDECIDED" and run.t_end > 0.1
     cause, advice, start = run.message.split("; ")
@@ -122,7 +124,7 @@ def test_branches_of_a_start_at_rest_are_listed_without_velocities():
 
 
 def test_run_of_a_microsecond_from_a_singular_position_is_exact():
-    """The truth is the judge's closed form of crank and rod of equal length."""
+    """Runs of 1 and 100 µs; the truth is the judge's closed form of crank and rod of equal length."""
     scene = upright_slider_crank(-30.0)
     for end in (1e-6, 1e-4):
         times = np.linspace(0.0, end, 3)
@@ -175,7 +177,7 @@ def ratio(crank: float, coupler: float) -> float:
 @pytest.mark.parametrize("rate", [2.0, -5.0])
 def test_spherical_loop_leaves_the_flat_position_on_the_branch_of_its_velocities(rate):
     """The ratio k of the half tangents of rocker and crank is constant (closed form), and so is the energy,
-    to 100 and 1000 times rtol, while the crank moves."""
+    to 100 and 1000 rtol. The crank's half tangent changes by more than 0.1."""
     for crank, coupler in ((0.7, 1.1), (1.2, 0.5), (0.9, 1.3)):
         k = ratio(crank, coupler)
         scene = spherical_loop(crank, coupler, 0.0, (rate, k * rate))
@@ -189,7 +191,8 @@ def test_spherical_loop_leaves_the_flat_position_on_the_branch_of_its_velocities
 
 
 def test_start_near_the_flat_position_of_a_spherical_loop_does_not_shorten_later_steps():
-    """Fewer than 100 steps. Rows that count as nearly dependent beyond the start would take 200 000 steps."""
+    """Fewer than 100 steps at rtol 1e-6. Rows that count as nearly dependent beyond the start would take 200
+    000 steps."""
     scene = spherical_loop(0.3, 0.6, 1e-4, (2.0, 2.0 * ratio(0.3, 0.6)))
     centred = scene.with_("joint[B].anchor", (0.0, 0.0, 0.0)).with_("joint[D].anchor", (0.0, 0.0, 0.0))
     run = simulate(centred, "taylor", [1.0], Limits(rtol=1e-6))

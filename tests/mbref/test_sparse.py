@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse import csr_array
 
-from crosscheck.judge.truth import truth_for
 from mbref.equations import initial_state
 from mbref.equations.active_coordinates import active_entries
 from mbref.equations.model import Model
@@ -23,14 +22,16 @@ from mbref.linear_algebra.sparse_cholesky import (
 )
 from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
 from mbref.scenes import find_scene
-from mbref.simulation.simulate import Limits, simulate
+from mbref.simulation.simulate import simulate
 
 
 @given(bodies=st.integers(1, 12), rows=st.integers(1, 40), seed=st.integers(0, 999))
 def test_sparse_factor_solves_and_multiplies_as_dense_matrices(bodies, rows, seed):
     """Random blocks of two bodies a row make D and S = D Dᵀ, with its diagonal times 1 + 1/α. By dense
     matrices: the residual of S b = r over |S| |b|, Dᵀ r and r - D x, all to rounding of sums of at most 72
-    terms; and the pivots of Cholesky's factor of S over √S_ii, whose least value is √(1/α)."""
+    terms; and the pivots of Cholesky's factor of S over √S_ii, whose least value is √(1/α), to a millionth
+    of this."""
+    rounding = 1e-12
     rng, n = np.random.default_rng(seed), 6 * bodies
     columns = 6 * rng.integers(0, bodies, rows)[:, None] + np.arange(6)
     second = np.where(rng.random(rows) < 0.3, bodies, (columns[:, 0] // 6 + 1) % (bodies + 1))
@@ -55,16 +56,16 @@ def test_sparse_factor_solves_and_multiplies_as_dense_matrices(bodies, rows, see
     left = np.abs(s_true @ b - rhs).max(initial=0) / (
         1 + np.abs(s_true).max(initial=0) * np.abs(b).max(initial=0)
     )
-    assert left < 1e-13, f"residual of the solution {left:.1e}"
+    assert left < rounding / 10, f"residual of the solution {left:.1e}"
     first = b.copy()
     b[:] = rhs
     solve(memory, b)
     assert np.array_equal(b, first), "another solution by the factor than with it"
     times_transpose(memory, rhs, factor.change)
-    assert np.abs(factor.change - d_true.T @ rhs).max(initial=0) < 1e-12
+    assert np.abs(factor.change - d_true.T @ rhs).max(initial=0) < rounding
     b[:] = rhs
     subtract_product(memory, x, b)
-    assert np.abs(b - (rhs - d_true @ x)).max(initial=0) < 1e-12
+    assert np.abs(b - (rhs - d_true @ x)).max(initial=0) < rounding
     pivots = np.sort(np.diag(np.linalg.cholesky(s_true)) / np.sqrt(np.diag(s_true)))
     find_squared_pivots(memory)
     seen = np.sqrt(np.sort(factor.squared_pivots))
@@ -81,45 +82,12 @@ def test_sparse_factor_solves_and_multiplies_as_dense_matrices(bodies, rows, see
     ],
 )
 def test_number_of_moving_rows_follows_from_the_plane_of_the_motion(name, gravity, rows):
-    """A row moves if one of its coordinates is not constant during the motion; the cases count such rows."""
+    """A row moves if one of its coordinates is not constant during the motion; comments of the cases count
+    such rows of each joint."""
     model = Model(find_scene(name).with_(gravity=gravity))
     start = initial_state.consistent_start(model)
     moving = active_entries(model, start.q, start.v)[1].any(axis=1)
     assert moving.sum() == rows, f"{moving.sum()} of {model.m} rows move"
-
-
-@pytest.mark.parametrize(
-    ("name", "end", "passes"), [("four_bar_chain[8]", 2.0, True), ("slider_crank_chain[6]", 0.2, False)]
-)
-def test_large_chain_moves_as_its_closed_form_past_singular_positions(name, end, passes):
-    """The judge's closed form: all loops of a chain have one angle, by the energy. Only four-bars become
-    flat, and pass it. The error (m) is below 1000 rtol."""
-    scene, times = find_scene(name), np.linspace(0.0, end, 11)
-    run = simulate(scene, "taylor", times, Limits(rtol=1e-11))
-    error = np.abs(run.position - truth_for(scene).poses(times).position).max()
-    assert run.outcome.name == "COMPLETED"
-    assert ("singular positions passed" in run.message) == passes, run.message
-    assert error < 1000 * 1e-11, f"error {error:.1e}"
-
-
-def test_chain_of_two_hundred_loops_swings_as_its_pendulum():
-    """One loop under gravity larger by the ratio of W (scene's docstring) has the angle of 200 loops; its
-    judge's closed form gives the place of each upright to rtol, 1e-9 (m)."""
-    loops, times = 200, np.array([0.25, 0.5])
-    run = simulate(find_scene(f"four_bar_chain[{loops}]"), "alf-dual+projection", times)
-    one = truth_for(find_scene("four_bar_chain[1]").with_(gravity=(0.0, -9.81 * 1.0 * ratio(loops), 0.0)))
-    offset = one.poses(times).position[:, 0] - np.array([0.0, 0.5, 0.0])
-    found = run.position[:, :: loops // 4][:, :5] - np.array([[i * loops // 4, 0.5, 0.0] for i in range(5)])
-    assert np.abs(found - offset[:, None]).max() < 1e-9
-
-
-def ratio(loops):
-    """Return W of that many loops over W of one loop."""
-
-    def pull(n):
-        return ((n + 1) / 2 + n) / ((n + 1) / 3 + n)
-
-    return pull(loops) / pull(1)
 
 
 @pytest.mark.parametrize("formulation", ["alf-dual", "mpi-svd"])
@@ -134,13 +102,14 @@ def test_velocities_across_the_plane_decay_to_zero_instead_of_denormals(formulat
 
 
 def test_shares_of_redundant_rows_are_squares_of_left_null_vectors():
-    """Two of six unit rows depend on others; NumPy's singular vectors give the null space to √rounding, as
-    the squared matrix is factorised. The last row is independent: its share is zero."""
+    """Two of six unit rows depend on others; NumPy's singular vectors give the null space. Shares agree to
+    √rounding, as the squared matrix is factorised. The last row is independent: its share is zero."""
+    rounding = 1e-12
     matrix = np.random.default_rng(7).normal(size=(6, 9))
     matrix[2], matrix[4] = 2.0 * matrix[0], matrix[1] - matrix[3]
     matrix /= np.linalg.norm(matrix, axis=1)[:, None]
     left, _, _ = np.linalg.svd(matrix)
     found = Redundancy(csr_array(matrix))
     assert found.rank == 4
-    np.testing.assert_allclose(found.shares, np.sum(left[:, 4:] ** 2, axis=1), atol=1e-6)
-    assert found.shares[5] < 1e-12
+    np.testing.assert_allclose(found.shares, np.sum(left[:, 4:] ** 2, axis=1), atol=np.sqrt(rounding))
+    assert found.shares[5] < rounding

@@ -91,7 +91,7 @@ def test_coriolis_forces_couple_two_slides_of_a_turning_table():
 def test_a_body_on_a_ball_joint_has_the_roots_of_eulers_equations():
     """Torque-free rotation about a principal axis, seen from the turning spindle: s = ± i Ω and s² = -Ω² (C -
     A) (C - B) / (A B). The angle about the axis is free: a double eigenvalue of zero, which rounding splits
-    by its square root."""
+    by its square root, up to 1e-4 rad/s."""
     rate, (a, b, c) = 5.0, (0.02, 0.03, 0.045)
     turned = {"name": "body", "mass": 1.0, "inertia": [a, b, c], "position": ORIGIN}
     bodies = [rod("spindle", (0.0, 0.0, 1.0), 1.0, 0.1), turned]
@@ -122,6 +122,8 @@ def test_motions_that_are_not_steady_are_refused_with_the_cause(change, says):
 
 
 def test_commands_print_stability_and_rate_of_a_steady_motion(tmp_path, capsys):
+    """A pendulum on a spindle that turns at 6 rad/s, above its critical rate, has stable motions beside the
+    axis."""
     path = str(tmp_path / "my.toml")
     turning_pendulum(6.0).save(path)
     assert main(["equilibrium", path, "--starts", "8"]) == 0

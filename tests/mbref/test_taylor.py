@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from crosscheck.judge.truth import truth_for
 from mbref.method import Method, MethodError
 from mbref.scene import Body, Driver, Revolute, Scene, Translational
 from mbref.scenes import SCENES
@@ -11,11 +10,13 @@ from mbref.simulation.simulate import Limits, simulate
 
 
 def test_taylor_named_as_the_integrator_of_alf_dual_in_old_records_is_the_method_taylor():
+    """Options are kept; the name of the method is printed without formulation and stabilisation."""
     assert str(Method.parse("taylor[order=14]")) == "taylor[order=14]"
     assert Method.parse("alf-dual+projection/taylor[order=14]") == Method.parse("taylor[order=14]")
 
 
 def test_taylor_with_a_formulation_and_orders_above_30_are_refused():
+    """The first refusal names the right method, the second the interval of orders."""
     with pytest.raises(MethodError, match=r"taylor has no formulation .* use taylor\[order=8\]"):
         Method.parse("lm1+none/taylor[order=8]")
     with pytest.raises(ValueError, match="order must be 4 to 30, got 31"):
@@ -26,9 +27,9 @@ def test_taylor_with_a_formulation_and_orders_above_30_are_refused():
 @pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (1.0, 2.0, 3.0)])
 def test_pendulum_on_a_driven_cart_swings_in_a_constant_field(axis, length):
     """The cart is at (0.2 t + 0.7 t²) L along its axis, u. Seen from it, the pendulum of moment J about its
-    hinge swings in the constant field g - 1.4 L u: ½ J ω² - m (g - 1.4 L u) · r is constant, to ten times
-    rtol, 1e-10, while the kinetic energy changes. The cart's place and the arm's length are kept to
-    rounding."""
+    hinge swings in the constant field g - 1.4 L u: ½ J ω² - m (g - 1.4 L u) · r is constant, to ten rtol,
+    while the kinetic energy changes by more than a millionth. The cart's place and the arm's length are kept
+    to rounding."""
     cart = Body(name="cart", mass=0.3, inertia=(1e-3, 1e-3, 1e-3), position=(0, 0, 0))
     place = (0.2 * length, 0.1 * length, -0.2 * length)
     bob = Body(name="bob", mass=2.5, inertia=tuple(np.array([0.02, 0.04, 0.04]) * length**2), position=place)
@@ -43,28 +44,14 @@ def test_pendulum_on_a_driven_cart_swings_in_a_constant_field(axis, length):
         driver=(Driver(joint="S", polynomial=(0.0, 0.2 * length, 0.7 * length)),),
     )
     times, along = np.linspace(0.0, 0.1, 5), np.array(axis) / np.linalg.norm(axis)
-    run = simulate(scene, "taylor", times, Limits(rtol=1e-10))
+    rtol, rounding = 1e-10, 1e-12
+    run = simulate(scene, "taylor", times, Limits(rtol=rtol))
     assert run.outcome.label == "COMPLETED", run.message
     travel = (0.2 * times + 0.7 * times**2)[:, None] * length * along
-    assert np.allclose(run["cart"].position, travel, rtol=0, atol=1e-12 * length)
+    assert np.allclose(run["cart"].position, travel, rtol=0, atol=rounding * length)
     arm, field = run["bob"].position - travel, np.array([0.0, 0.0, -9.81]) - 1.4 * length * along
     moment, mass = 0.04 * length**2 + 2.5 * (place[0] ** 2 + place[2] ** 2), 2.5
     kinetic = 0.5 * moment * run["bob"].angular_velocity[:, 1] ** 2
     energy = kinetic - mass * arm @ field
-    assert np.ptp(energy) < 1e-9 * np.abs(energy).max() and np.ptp(kinetic) > 1e-6 * kinetic.max()
-    assert np.linalg.norm(arm, axis=1) == pytest.approx(np.linalg.norm(place), rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("name", "end"), [("planar_slider_crank_equal", 0.1), ("planar_slider_crank_heavy", 2.0)]
-)
-def test_acceleration_at_a_singular_position_is_exact_and_one_more_reaction_is_open(name, end):
-    """The judge's closed form at the first crossing, just after it and later, to 100 rtol of the largest. At
-    the crossing each joint has one more open component than later."""
-    scene = SCENES[name]()
-    crossing = simulate(scene, "taylor", [end]).crossings[0].time
-    times = crossing * np.array([1.0, 1.0 + 3e-7, 1.2])
-    run, exact = simulate(scene, "taylor", times), truth_for(scene).poses(times).acceleration
-    assert run.outcome.name == "COMPLETED", run.message
-    assert np.abs(run.acceleration - exact).max() < 100 * 1e-9 * np.abs(exact).max()
-    assert run.open_reactions and all(count[0] == count[2] + 1 for count in run.open_reactions.values())
+    assert np.ptp(energy) < 10 * rtol * np.abs(energy).max() and np.ptp(kinetic) > 1e-6 * kinetic.max()
+    assert np.linalg.norm(arm, axis=1) == pytest.approx(np.linalg.norm(place), rel=rounding)

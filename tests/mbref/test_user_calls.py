@@ -17,6 +17,7 @@ def saved(tmp_path) -> str:
 
 
 def test_diagnosis_takes_a_file_s_name_a_built_in_name_or_a_scene(saved):
+    """The file has the pendulum; a name of neither a file nor a built-in scene is refused."""
     assert mbref.diagnose(saved) == mbref.diagnose(PENDULUM) == mbref.diagnose(PENDULUM.with_())
     assert mbref.diagnose("four_bar").counts == mbref.diagnose(SCENES["four_bar"]()).counts
     with pytest.raises(mbref.SceneError, match="unknown scene 'no_such_scene'"):
@@ -32,7 +33,8 @@ def test_duration_gives_a_run_101_samples_up_to_its_end(saved):
 
 
 def test_argument_rtol_of_simulate_equals_rtol_of_limits(saved):
-    """A smaller one takes more steps; either way of giving it leads to one motion, to the bit."""
+    """A tolerance of 1e-10 takes more steps than 1e-3; either way of giving it leads to one motion, to the
+    bit."""
     loose, fine = (mbref.simulate(saved, "lm1+none", [2.0], rtol=rtol) for rtol in (1e-3, 1e-10))
     assert fine.cost.steps > loose.cost.steps, "the tolerance was not taken"
     same = mbref.simulate(saved, "lm1+none", [2.0], mbref.Limits(rtol=1e-10))
@@ -40,11 +42,13 @@ def test_argument_rtol_of_simulate_equals_rtol_of_limits(saved):
 
 
 def test_duration_together_with_sample_times_is_refused(saved):
+    """The duration would be 0.2 s, the only sample time is 0.1 s."""
     with pytest.raises(ValueError, match="give sample times or a duration, not both"):
         mbref.simulate(saved, "lm1+none", [0.1], duration=0.2)
 
 
 def test_motion_is_saved_as_json_only(saved, tmp_path):
+    """The suffix may have capitals; with another one no file is written."""
     run = mbref.simulate(saved, "lm1+none", duration=0.05)
     with pytest.raises(ValueError, match=r"run.mp4: a motion is saved as .json"):
         run.save(tmp_path / "run.mp4")
@@ -67,5 +71,7 @@ def test_motion_is_saved_as_json_only(saved, tmp_path):
     ],
 )
 def test_times_of_simulate_that_are_no_samples_are_refused(times, says):
+    """No time, a list of lists, times that do not increase, negative and missing ones, texts, and a number
+    beyond doubles."""
     with pytest.raises(InputError, match=f"^times: {says}$"):
         mbref.simulate("four_bar", times=times)

@@ -3,6 +3,7 @@
 import ast
 import functools
 from collections.abc import Iterator, Mapping, Sequence
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -110,31 +111,13 @@ def children(arrows: Graph, folder: str) -> dict[str, set[str]]:
     return found
 
 
-def circles(arrows: Graph) -> list[list[str]]:
-    """The strongly connected components of more than one module, by Tarjan's algorithm."""
-    index: dict[str, int] = {}
-    low: dict[str, int] = {}
-    stack: list[str] = []
-    found: list[list[str]] = []
-
-    def visit(node: str) -> None:
-        index[node] = low[node] = len(index)
-        stack.append(node)
-        for target in sorted(arrows[node]):
-            if target not in index:
-                visit(target)
-            if target in stack:
-                low[node] = min(low[node], low[target])
-        if low[node] == index[node]:
-            component = stack[stack.index(node) :]
-            del stack[stack.index(node) :]
-            if len(component) > 1:
-                found.append(sorted(component))
-
-    for node in sorted(arrows):
-        if node not in index:
-            visit(node)
-    return found
+def circle(arrows: Graph) -> list[str]:
+    """Return the sorted modules of a circle of imports; none if there is no circle."""
+    try:
+        TopologicalSorter(arrows).prepare()
+    except CycleError as error:
+        return sorted(set(error.args[1]))
+    return []
 
 
 def floors(arrows: Graph) -> dict[str, int]:

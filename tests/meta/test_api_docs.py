@@ -112,6 +112,7 @@ def faults(name: str, thing: Any) -> list[str]:
 
 
 def test_docstrings_of_public_names_describe_parameters_results_and_errors():
+    """More than 45 classes and functions are public; ``faults`` has the rules of numpydoc."""
     found = public()
     assert len(found) > 45
     wrong = [fault for name, thing in found.items() for fault in faults(name, thing)]
@@ -161,6 +162,7 @@ def scaled(values, factor: float) -> "np.ndarray":
 
 
 def test_complete_docstring_has_no_fault(tmp_path):
+    """COMPLETE is a function with all sections; the next test takes parts of its docstring away."""
     assert faults("scaled", imported(tmp_path, COMPLETE).scaled) == []
 
 

@@ -34,5 +34,6 @@ def test_section_has_at_most_60_entries_of_one_line_without_timings():
 
 
 def test_headings_are_the_six_of_keep_a_changelog():
+    """Headings of the third level, below those of versions."""
     found = re.findall(r"^### (.*)$", TEXT, flags=re.M)
     assert found and set(found) <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}

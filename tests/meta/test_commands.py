@@ -32,6 +32,7 @@ def test_command_that_a_page_prints_is_accepted_by_its_parser(page, words):
 
 
 def test_files_that_pages_run_by_python_exist():
+    """A page prints ``python FILE``."""
     files = [words[1] for _, words in FOUND if words[0] == "python"]
     assert files and not [file for file in files if not (ROOT / file).is_file()], files
 

@@ -64,6 +64,8 @@ def test_new_formulation_appears_in_list_table_page_and_contents(monkeypatch, ca
 
 
 def test_page_of_methods_has_the_generated_table_of_formulations():
+    """``with_table`` writes the table into the page, which it must not change; ``with_links`` makes links of
+    names."""
     text = (DOCS / "methods.md").read_text()
     assert method_pages.with_table(text) == text, "python docs/method_pages.py renews the table"
     for name in FORMULATIONS:
@@ -72,15 +74,16 @@ def test_page_of_methods_has_the_generated_table_of_formulations():
 
 
 def test_every_method_in_a_measured_table_exists():
+    """A comment "measured" above a table names its methods; an unknown name raises."""
     texts = [*(page.read_text() for page in PAGES), *MADE.values()]
     found = [m for text in texts for m in re.findall(r"<!-- measured: (.+?) -->", text)]
     names = [name for row in found for name in row.split()]
     assert names
     for name in names:
-        Method.parse(name)  # raises for an unknown name
+        Method.parse(name)
 
 
-def test_page_of_the_scene_format_shows_a_figure_of_every_joint_and_load_and_of_nothing_else():
+def test_page_of_the_scene_format_shows_a_figure_of_each_joint_and_load_and_no_other():
     """A figure that the page shows is drawn by docs/hooks.py when the site is built."""
     text = (DOCS / "scene-format.md").read_text()
     shown = re.findall(r"\]\(figures/((?:joint|load)_\w+)\.svg\)", text)

@@ -10,7 +10,6 @@ import pytest
 
 from mbref.integrators import INTEGRATORS
 from mbref.scenes import SCENES
-from mbref.stabilisation import STABILISATIONS
 from tests.meta.imports import parsed, statements
 
 ROOT = Path(__file__).parents[2]
@@ -44,6 +43,7 @@ def name(path):
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_package_imports_only_packages_below_it(package):
+    """MAY_IMPORT has the rule reports → crosscheck → mbref; no package imports tests."""
     theirs = {*PACKAGES, "tests"} - MAY_IMPORT[package]
     upward = {name(path): found for path in files(package) if (found := imports(path) & theirs)}
     assert not upward, f"{upward}, against reports → crosscheck → mbref"
@@ -61,6 +61,7 @@ def test_engine_is_imported_only_in_adapters_and_inside_functions():
 
 
 def test_matplotlib_is_imported_only_by_reports_and_the_plot_of_a_motion():
+    """The plot imports it inside a function, so that mbref runs without it."""
     others = [path for path in FILES if "reports" not in path.parts]
     plotting = [path for path in others if "matplotlib" in imports(path)]
     assert plotting == [ROOT / "mbref" / "motions" / "drawing" / "plot.py"], plotting
@@ -68,11 +69,13 @@ def test_matplotlib_is_imported_only_by_reports_and_the_plot_of_a_motion():
 
 
 def test_file_has_at_most_330_lines():
+    """More than 50 files of the three packages are counted."""
     lengths = {name(path): len(path.read_text().splitlines()) for path in FILES}
     assert len(lengths) > 50 and not {path: length for path, length in lengths.items() if length > LONGEST}
 
 
 def test_at_most_60_lines_are_kept_from_the_formatter():
+    """A mark at the end of a statement skips it."""
     folders = (*PACKAGES, "tests", "benchmarks", "examples", "docs")
     sources = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
     marked = {name(path): count for path in sources if (count := path.read_text().count("# fmt: " + "skip"))}
@@ -80,13 +83,15 @@ def test_at_most_60_lines_are_kept_from_the_formatter():
 
 
 def test_file_has_a_docstring_of_more_than_ten_characters():
-    """The first line counts."""
+    """The first line counts: less than 10 characters say nothing."""
     first = {name(path): (ast.get_docstring(parsed(path)) or "").partition("\n")[0] for path in FILES}
     assert not [path for path, line in first.items() if len(line) <= 10]
 
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_public_function_and_class_has_a_docstring(package):
+    """Functions and classes of a module, not those inside others. Kernels of methods have theirs on the base
+    class."""
     kernels = {"accelerate", "enter", "rates", "accept", "step", "propose"}  # contract on the base class
     silent = [
         f"{name(path)}: {node.name}"
@@ -139,14 +144,8 @@ def test_a_name_of_a_class_or_constant_has_one_meaning_in_mbref():
     assert double == interface, double ^ interface
 
 
-def test_page_of_methods_lists_every_stabilisation():
-    """A row of a table of docs/methods.md begins with the name."""
-    text = (ROOT / "docs" / "methods.md").read_text()
-    listed = set(re.findall(r"^\| `([\w-]+)`", text, flags=re.M))
-    assert set(STABILISATIONS) <= listed, f"docs/methods.md does not list {set(STABILISATIONS) - listed}"
-
-
 def test_readme_has_at_most_120_lines():
+    """A reader sees it on three screens."""
     assert len((ROOT / "README.md").read_text().splitlines()) <= 120
 
 
@@ -184,7 +183,8 @@ def test_slow_tests_are_left_out_by_default_and_run_by_make_deep():
 
 
 def test_list_of_slow_cases_names_existing_tests():
-    """The cases themselves are checked by conftest.py when all tests are collected."""
+    """More than 50 files are listed. The cases themselves are checked by conftest.py when all tests are
+    collected."""
     listed = tomllib.loads((ROOT / "tests" / "slow.toml").read_text())
     assert len(listed) > 50
     for file, tests in listed.items():
@@ -194,6 +194,8 @@ def test_list_of_slow_cases_names_existing_tests():
 
 
 def test_constraints_pin_exact_versions_without_addresses():
+    """A line is NAME==VERSION, perhaps with a condition on the platform; comments and blank lines are left
+    out."""
     lines = [
         line for line in (ROOT / "constraints.txt").read_text().splitlines() if line[:1] not in ("#", "")
     ]

@@ -38,4 +38,5 @@ def test_messages_contain_no_private_word_and_no_phrase_without_a_noun(unclear):
     ],
 )
 def test_collector_finds_messages_and_leaves_out_docstrings_and_short_texts(source, found):
+    """Four lines of source and the messages in them; ``{…}`` stands for a value."""
     assert [text for _, text in messages(source)] == found

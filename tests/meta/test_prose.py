@@ -10,6 +10,7 @@ PAGES = prose.pages()
 
 @pytest.mark.parametrize("path", PAGES, ids=[str(path.relative_to(prose.ROOT)) for path in PAGES])
 def test_page_has_no_fault_by_the_rules_of_prose(path):
+    """``prose.faults`` finds private words, long sentences and faults by proselint."""
     found = [f"{path.name}:{line}: {message}" for line, message in prose.faults(path.read_text())]
     assert not found, "\n".join(found)
 

@@ -7,6 +7,7 @@ import numpy as np
 from reports.mechanisms import RUN
 
 SVG = "{http://www.w3.org/2000/svg}"
+BACKGROUND = 9.0  # px, thickness of the bodies in the motion behind a run
 
 
 def bars(picture: str, thickness: float = RUN, panel: int = 0) -> list[np.ndarray]:

@@ -45,6 +45,7 @@ def test_committed_page_shows_the_figures_of_the_paper_s_numbers():
 
 
 def test_paper_s_records_are_of_one_clean_commit_that_the_readme_states(records):
+    """A "+" marks a commit with changes; README has the first seven letters of the commit."""
     commits = {record["commit"] for record in records.records.values()}
     [commit] = commits
     assert "+" not in commit, f"made from a clean checkout: {commit}"

@@ -51,10 +51,6 @@ def violations(verified) -> Table:
     return found
 
 
-def test_conformance_section_without_records_is_empty(tmp_path):
-    assert conformance.render(stored.verified(tmp_path)) == []
-
-
 def test_explanations_name_known_engines_and_checks_and_every_check_has_a_proof():
     """The explanations are of violations by engines; a proof is a planted defect that the check detects."""
     for engine, check, _ in explained.explanations():

@@ -27,18 +27,12 @@ def pixels(png: bytes) -> int:
         return len({row.tobytes() for row in np.asarray(picture)})
 
 
-def test_every_scene_has_its_four_figures():
-    """Two scenes with records: the moving mechanism, speed against error, violation and energy over time."""
-    kinds = ("mechanism", "speed", "violation", "energy")
-    wanted = {f"{name}-{kind}" for name in ("spatial_slider_crank", "planar_slider_crank") for kind in kinds}
-    assert set(pictures()) == wanted, set(pictures()) ^ wanted
-
-
 @pytest.mark.parametrize(
     "name", [f"spatial_slider_crank-{k}" for k in ("mechanism", "speed", "violation", "energy")]
 )
 def test_figure_is_not_blank_and_reproducible(name):
-    """Drawn twice it is one SVG. Blank pictures have neither ten paths nor 60 different rows of pixels."""
+    """Drawn twice it is one SVG. Blank pictures have less than 10 paths, and less than 60 different rows of
+    pixels."""
     picture = pictures()[name]
     once, again = figures.svg(picture.draw(), name), figures.svg(picture.draw(), name)
     assert once == again, f"{name} changes from one drawing to the next"

@@ -197,7 +197,7 @@ def test_table_of_cranks_shows_that_an_exact_record_never_leaves_the_true_motion
 
 
 def test_accelerations_of_exact_records_have_all_digits_and_a_failed_start_has_none(records):
-    """Errors of records of exact motions are below 50 roundings; without a sample they are NaN."""
+    """Errors of records of exact motions are below 1e-14, 50 roundings; without a sample they are NaN."""
     for name, errors in paper_methods.digit_errors(records).items():
         assert max(errors) < 1e-14, (name, errors)
     missing = Label("digits", "alf", "100")
@@ -210,7 +210,8 @@ def test_accelerations_of_exact_records_have_all_digits_and_a_failed_start_has_n
 
 
 def test_every_figure_is_drawn_and_curves_over_time_run_forwards(blocks):
-    """All motions last 10 ms or more: violations on the axis of times would be smaller."""
+    """More than four figures have an axis of times. All motions last 0.01 s or more: violations on this axis
+    would be smaller."""
     drawn = {block.name: block.draw() for block in blocks if isinstance(block, Figure)}
     for number in (4, 5, 6, 8, 11, 12, 13, 14, 15, 16):
         assert f"paper-figure-{number}" in drawn, f"Figure {number} is missing of {list(drawn)}"

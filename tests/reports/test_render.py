@@ -55,18 +55,8 @@ def test_page_opens_offline(written):
         assert loads.search(page.replace("</body>", f"{element}</body>")), element
 
 
-def test_contents_of_the_page_lead_to_its_sections(written):
-    """Links up to the end of <nav> are the contents."""
-    page = (written / "index.html").read_text()
-    targets, ids = (
-        re.findall(r'href="#([\w-]+)"', page.split("</nav>")[0]),
-        set(re.findall(r'id="([\w-]+)"', page)),
-    )
-    assert targets and set(targets) <= ids, set(targets) - ids
-
-
 def test_markdown_shows_eight_figures_as_png_and_svg(written):
-    """Two scenes have four figures each."""
+    """Two scenes have four figures each. A picture of less than 5_000 bytes would be nearly empty."""
     text = (written / "report.md").read_text()
     shown = re.findall(r"!\[[\w-]+\]\(([^)]+)\)", text)
     assert len(set(shown)) == 8, shown

@@ -7,6 +7,7 @@ from reports import __main__ as program
 
 @pytest.mark.parametrize(("asked", "given"), [(["four_bar"], "scenes"), (["--engine", "mbref"], "engines")])
 def test_paper_section_refuses_scenes_and_engines(tmp_path, capsys, asked, given):
+    """The section has the paper's mechanisms, run by mbref; no folder is made."""
     folder = tmp_path / "report"
     assert program.main([*asked, "--section", "paper", "--depth", "whole", "--out", str(folder)]) == 2
     assert f"--section paper: has {given} of its own; leave them out" in capsys.readouterr().err

@@ -1,7 +1,6 @@
 """Sections: the records / the numbers and words in the blocks; nothing is simulated."""
 
 import dataclasses
-import math
 import re
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from crosscheck.judge.model_identity import gate_times
 from crosscheck.judge.truth import truth_for
 from mbref.motions.trajectory import Outcome
 from reports.blocks import Figure, Heading, Table, Text
-from reports.runs import Run, SceneRuns, by_scene, ratio
+from reports.runs import Run, SceneRuns, by_scene
 from reports.sections import (
     NAMES,
     blocks,
@@ -48,19 +47,6 @@ def everything():
     return blocks(groups(), verified=VERIFIED)
 
 
-def test_every_section_has_its_heading():
-    """Headings are of level 2, and of level 3 within the section of a scene."""
-    headings = [(part.level, part.text) for part in blocks(groups()) if isinstance(part, Heading)]
-    of_all = {"Summary", "spatial_slider_crank", "Order of convergence", "Least errors", "Records", "Support"}
-    of_a_scene = {"The mechanism", "Speed against error", "Constraint violation over time", "Outcomes"}
-    assert of_all | {"Every scene in every engine", "Provenance"} <= {
-        text for level, text in headings if level == 2
-    }
-    assert of_a_scene | {"Energy balance over time", "The limit h → 0"} <= {
-        t for level, t in headings if level == 3
-    }
-
-
 def test_page_on_comparisons_lists_all_sections_of_a_report_in_their_order():
     """The page is docs/compare.md."""
     page = (Path(__file__).parents[2] / "docs" / "compare.md").read_text()
@@ -91,16 +77,6 @@ def test_summary_shows_costs_errors_and_failures_of_the_records():
     assert column(found, "Least error")["mujoco", "tuned"] == "2.00e-03", found.rows
     assert column(found, "Its settings")["mujoco", "tuned"] == "step=0.025", found.rows
     assert "at 1e-3 mbref mpi-svd+projection (10 ms), at 1e-6 none" in found.caption, found.caption
-
-
-def test_summary_shows_the_ratio_of_two_work_precision_curves():
-    """Half-way between 1e-2 and 1e-4 in both logarithms: √(0.02 · 0.2) s / √(0.01 · 0.04) s."""
-    slow = [record("a", "x", e, s, rtol=e) for e, s in ((1e-2, 0.02), (1e-4, 0.2))]
-    fast = [record("b", "y", e, s, rtol=e) for e, s in ((1e-2, 0.01), (1e-4, 0.04))]
-    [group] = by_scene([*slow, *fast], {scene().name: scene()})
-    at = column(table(summary.render([group]), "Least error"), "At 1e-3")
-    expected = math.sqrt(0.02 * 0.2) / math.sqrt(0.01 * 0.04)
-    assert at["b", "y"] == "1.0" and at["a", "x"] == ratio(expected) == "3.2", (at, expected)
 
 
 def test_published_problem_accepts_a_run_by_its_own_measure():
@@ -141,7 +117,8 @@ def test_convergence_table_shows_the_orders_put_into_the_records():
 
 
 def test_limit_table_shows_the_bias_and_discretisation_put_in():
-    """Engine a: 1e-4 + 1e-2 h, of which 1e-5 is discretisation at h = 1e-3. Engine b: 1e-2 h², no bias."""
+    """Engine a: 1e-4 + 1e-2 h, of which 1e-5 is discretisation at h = 1e-3. Engine b: 1e-2 h², without bias,
+    which is rounding below 1e-12."""
     soft = [record("a", "soft", 1e-4 + 1e-2 * h, 0.1, step=h) for h in (0.04, 0.02, 0.001)]
     true = [record("b", "true", 1e-2 * h**2, 0.1, step=h) for h in (0.04, 0.02, 0.01)]
     [group] = by_scene([*soft, *true], {scene().name: scene()})
@@ -221,6 +198,7 @@ def test_failure_marks_are_explained_with_outcome_and_message():
 
 
 def test_scene_whose_only_run_crashed_at_the_start_has_sentences_instead_of_figures():
+    """The sections on the mechanism's motion and on energy have nothing to draw."""
     [group] = by_scene([nothing("a", "x")], {scene().name: scene()})
     for render in (mechanism.render, energy.render):
         parts = render(group)
