@@ -4,7 +4,6 @@ import csv
 import dataclasses
 import json
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ import pytest
 from mbref import Motion, Trajectory, find_scene, simulate
 from mbref.motions.drawing.plot import grouped
 
-ROOT = Path(__file__).parents[2]
 TIMES = np.linspace(0.0, 0.1, 21)
 ROUNDING = 1e-11  # rad, m: of angles of 12 rad
 
