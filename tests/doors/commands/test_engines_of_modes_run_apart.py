@@ -7,7 +7,8 @@ from tests.helpers.fake_engines import FAKES
 
 
 def test_modes_reports_the_crash_of_one_engine_and_hides_the_banner_of_another(capfd):
-    """SEGFAULT ends by SIGSEGV. CHATTER writes a banner past Python, and has no accelerations."""
+    """The engine SEGFAULT ends its process by SIGSEGV. CHATTER, version 1.2.3, writes the word "banner" to
+    the file descriptor of standard output, and has no accelerations."""
     engines = [word for name in ("SEGFAULT", "CHATTER") for word in ("--engine", f"{FAKES}:{name}")]
     assert main(["modes", "point_pendulum", "--starts", "1", "--json", *engines]) == 0
     out, said = capfd.readouterr()

@@ -69,14 +69,10 @@ def python(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def output(python: Path, tmp_path: Path, *words: str | Path) -> str:
     """Return the output of Python in an empty directory, which stays empty."""
+    command, outside = [python, *words], {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+    limit = 600  # s; Pinocchio compiles C++ code
     run = subprocess.run(
-        [python, *words],
-        cwd=tmp_path,
-        env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
-        capture_output=True,
-        text=True,
-        timeout=600,  # s; Pinocchio compiles C++ code
-        check=False,
+        command, cwd=tmp_path, env=outside, capture_output=True, text=True, timeout=limit, check=False
     )
     assert run.returncode == 0, f"{words[-1]}: status {run.returncode}: {run.stderr[-800:]}"
     assert not list(tmp_path.iterdir()), f"{words[-1]} left {list(tmp_path.iterdir())}"
@@ -84,7 +80,8 @@ def output(python: Path, tmp_path: Path, *words: str | Path) -> str:
 
 
 def test_packages_of_readmes_first_command_have_engines_matplotlib_and_pandas_alone(python, tmp_path):
-    """The requirements in pyproject.toml are resolved as pip does; other tests of this file need it."""
+    """pip resolves the requirements in pyproject.toml so. The environment has neither pytest nor pip, so that
+    the examples below run with what a user has installed."""
     found = "from importlib.util import find_spec as f; print(*(f(n) is not None for n in {}))"
     code = found.format(("mujoco", "pinocchio", "exudyn", "matplotlib", "pandas", "pytest", "pip"))
     assert output(python, tmp_path, "-c", code).split() == ["True"] * 5 + ["False"] * 2

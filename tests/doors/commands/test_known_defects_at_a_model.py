@@ -6,7 +6,6 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import crosscheck.findings
@@ -17,6 +16,7 @@ from crosscheck.findings.finding import Finding, When, findings
 from crosscheck.invariants.experiments import four_bar
 from mbref.scene import Scene
 from tests.helpers.falling_engine import STONE
+from tests.helpers.parts import hinge, joint
 
 CHAINS = Path(__file__).parents[3] / "examples" / "four_chains.xml"
 ENGINE = "tests.helpers.falling_engine:ENGINE"
@@ -49,9 +49,7 @@ def test_defect_is_reported_where_its_remedy_mends_the_accelerations():
     ],
     ids=["remedy changes nothing", "remedy makes it wrong", "other version", "no loop", "no hinge"],
 )
-def test_no_defect_is_reported_without_an_improvement_or_where_its_conditions_are_not_met(
-    options: dict[str, Any], remedy: dict[str, Any], conditions: dict[str, Any]
-):
+def test_no_defect_is_reported_without_improvement_or_where_its_conditions_fail(options, remedy, conditions):
     """Factors are of gravity. The engine has the version 1.0, and the stone neither loops nor joints."""
     assert said(options, remedy, **conditions) == []
 
@@ -67,37 +65,29 @@ def turned(name: str) -> Scene:
 def welded() -> Scene:
     """Return an arm on a hinge; two hinges on one axis and a ball joint hold a tip to the arm."""
     arm = {"name": "arm", "mass": 1.0, "inertia": [0.05, 0.06, 0.07], "position": (0.3, 0.1, 0.2)}
-    tip = arm | {"name": "tip", "position": (0.8, 0.3, 0.1)}
-    place, axis = np.array([0.5, 0.0, 0.0]), np.array([0.6, 0.48, 0.64])
-    ends = ("ground", "arm"), ("arm", "tip"), ("arm", "tip")
-    lines = (np.zeros(3), [0.0, 0.0, 1.0]), (place, axis), (place + 0.3 * axis, axis)
-    hinges = [
-        {"name": f"hinge{k}", "type": "revolute", "bodies": pair, "anchor": list(at), "axis": list(along)}
-        for k, (pair, (at, along)) in enumerate(zip(ends, lines, strict=True))
+    tip, axis = arm | {"name": "tip", "position": (0.8, 0.3, 0.1)}, (0.6, 0.48, 0.64)
+    joints = [
+        hinge("hinge0", "ground", "arm", (0.0, 0.0, 0.0)),
+        hinge("hinge1", "arm", "tip", (0.5, 0.0, 0.0), axis),
+        hinge("hinge2", "arm", "tip", (0.5 + 0.3 * 0.6, 0.3 * 0.48, 0.3 * 0.64), axis),
+        joint("ball", "spherical", "arm", "tip", (0.7, 0.3, 0.1)),
     ]
-    ball = {"name": "ball", "type": "spherical", "bodies": ("arm", "tip"), "anchor": (0.7, 0.3, 0.1)}
-    return Scene(name="welded", gravity=(0.0, -9.81, 0.0), body=[arm, tip], joint=[*hinges, ball])
+    return Scene(name="welded", gravity=(0.0, -9.81, 0.0), body=[arm, tip], joint=joints)
 
 
 def three_links() -> Scene:
     """Return a loop of a crank and two links on ball joints, which falls from rest."""
     places = ((0.4, 0.1, 0.2), (1.4, 0.1, 0.2), (1.4, 0.6, 0.7))
-    links = [
-        {"name": f"link{k}", "mass": 1.0, "inertia": [0.05, 0.06, 0.07], "position": place}
-        for k, place in enumerate(places)
-    ]
-    crank = {"name": "A", "type": "revolute", "bodies": ("ground", "link0")}
-    balls = (
-        ("link0", "link1", (1.0, 0.0, 0.0)),
-        ("link1", "link2", (1.0, 0.5, 0.5)),
-        ("link2", "ground", (1.5, 0.7, 0.8)),
-    )
-    joints = [
-        {"name": f"{a}-{b}", "type": "spherical", "bodies": (a, b), "anchor": anchor}
-        for a, b, anchor in balls
-    ]
-    axis = {"anchor": (0.0, 0.0, 0.0), "axis": (0.0, 0.0, 1.0)}
-    return Scene(name="links", gravity=(0.0, 0.0, -9.81), body=links, joint=[crank | axis, *joints])
+    link = {"mass": 1.0, "inertia": [0.05, 0.06, 0.07]}
+    links = [{"name": f"link{k}", "position": place, **link} for k, place in enumerate(places)]
+    balls = {
+        ("link0", "link1"): (1, 0, 0),
+        ("link1", "link2"): (1, 0.5, 0.5),
+        ("link2", "ground"): (1.5, 0.7, 0.8),
+    }
+    joints = [hinge("A", "ground", "link0", (0.0, 0.0, 0.0))]
+    joints += [joint("-".join(pair), "spherical", *pair, at) for pair, at in balls.items()]
+    return Scene(name="links", gravity=(0.0, 0.0, -9.81), body=links, joint=joints)
 
 
 # a mechanism that meets the conditions of a finding and has it, and one that meets them without having it
@@ -110,7 +100,7 @@ MODELS: dict[str, tuple[Scene | Path, Scene]] = {
 
 
 def test_each_finding_with_conditions_has_a_mechanism_in_these_tests():
-    """Mechanisms are listed by finding."""
+    """A finding whose file says at which scenes it applies is tried below on the mechanisms of MODELS."""
     assert WITH.keys() == MODELS.keys()
 
 

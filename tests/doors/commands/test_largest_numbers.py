@@ -51,7 +51,8 @@ def ended(capsys: pytest.CaptureFixture[str], *command: str) -> tuple[object, st
 @pytest.mark.parametrize("text", HUGE, ids=lambda text: f"{text[:6]} ({len(text)})")
 @pytest.mark.parametrize("command", COUNTS, ids=" ".join)
 def test_count_outside_its_range_is_refused_with_the_range(command: tuple[str, ...], text: str, capsys):
-    """COUNTS has the range of each option. The line stays short, also for a number of 5000 digits."""
+    """COUNTS has the range of each option, HUGE the numbers. The last line of the error is a screen's width
+    or two long, also for a number of 5000 digits, of which 40 are shown."""
     status, said = ended(capsys, *command, text)
     assert status == 2
     assert f"{command[-1]}: must be a whole number {COUNTS[command]}, got {text[:40]}" in said
@@ -60,7 +61,8 @@ def test_count_outside_its_range_is_refused_with_the_range(command: tuple[str, .
 
 @pytest.mark.parametrize(("command", "text"), [(c, text) for c in RANGES for text in RANGES[c][1]])
 def test_number_outside_its_range_is_refused_with_the_range(command: str, text: str, capsys):
-    """Times, tolerances and errors; an error is relative to the mechanism's length, so at most 1."""
+    """RANGES has the option's range and numbers outside of it. An error is relative to the mechanism's
+    length, so at most 1. The number is shown as it was given, or with six digits."""
     *words, option = command.split()
     status, said = ended(capsys, *words, f"{option}={text}")
     beginning = f"{option}: must be {RANGES[command][0]}, got "
@@ -114,7 +116,7 @@ def test_closure_gap_longer_than_the_mechanism_is_refused_with_its_length(capsys
 
 
 def test_samples_that_would_fill_the_memory_are_refused_with_the_largest_number(tmp_path, capsys):
-    """A reference may have 5 million samples times bodies."""
+    """A reference may have 5 million samples times bodies; 20 four-bars in a chain have 41 bodies."""
     out = tmp_path / "ref.csv"
     status, said = ended(capsys, "reference", "four_bar_chain[20]", "--out", str(out), "--samples", "1000000")
     assert f"--samples: at least 2 and at most {5_000_000 // 41} for the 41 bodies of four_bar_chain" in said
@@ -126,13 +128,14 @@ def test_samples_that_would_fill_the_memory_are_refused_with_the_largest_number(
     [
         (
             {"samples": 10**20},
-            "--samples: at least 2 and at most 5000000 for the 1 bodies of resting, got 1000",
+            "--samples: at least 2 and at most 5000000 for the 1 bodies of resting, got 10",
         ),
-        ({"samples": 1}, "--samples: at least 2 and at most 5000000 for the 1 bodies of resting, got 1"),
+        ({"samples": 1}, "--samples: at least 2 and at most 5000000 for the 1 bodies of resting, got 1$"),
         ({"time_limit": 1e30}, r"--time-limit: must be positive and at most 1e\+07 s, got 1e\+30"),
         ({"time_limit": -1.0}, r"--time-limit: must be positive and at most 1e\+07 s, got -1"),
     ],
 )
 def test_function_compare_refuses_samples_and_times_as_the_command_does(wanted: dict[str, Any], said: str):
+    """The scene has one body; a reference may have 5 million samples times bodies."""
     with pytest.raises(RequestError, match=said):
         crosscheck.compare(resting(), "tests.helpers.still_engines:LOGGED", **wanted)

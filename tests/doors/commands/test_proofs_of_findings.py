@@ -47,6 +47,7 @@ def test_engine_has_the_error_if_the_last_number_of_its_proof_exceeds_the_limit(
     ids=["no number", "error", "exit status"],
 )
 def test_proof_without_a_number_is_unclear_and_the_answer_has_the_reason(script: str, says: str):
+    """The script prints a word, raises an error, or ends Python with status 3."""
     answer = Finding(**TEXTS, package="numpy", script=script, wrong_above=1.0).recheck()
     assert answer.status is Status.UNCLEAR and says in answer.words
 
@@ -62,10 +63,10 @@ def wait_for(what: Any) -> Any:
 def test_script_of_a_proof_ends_when_the_command_that_runs_it_is_killed(tmp_path: Path):
     """The script writes its process number and sleeps 600 s. SIGKILL ends its parent; within 60 s, on a
     loaded machine, the script's process has ended, too."""
-    told = tmp_path / "number"
-    script = SLEEPER.format(path=str(told))
+    pid_file = tmp_path / "number"
+    script = SLEEPER.format(path=str(pid_file))
     parent = subprocess.Popen([sys.executable, "-c", PARENT.format(script=script)], cwd=os.getcwd())
-    number = int(wait_for(lambda: told.exists() and told.read_text()))
+    number = int(wait_for(lambda: pid_file.exists() and pid_file.read_text()))
     parent.send_signal(signal.SIGKILL)
     parent.wait()
 

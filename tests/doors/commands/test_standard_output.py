@@ -11,42 +11,38 @@ from tests.helpers.falling_engine import STONE
 
 PROGRAMS = {"mbref": main, "crosscheck": crosscheck}
 PRINTING = [
-    ("mbref", ["list"]),
-    ("mbref", ["schema"]),
-    ("mbref", ["diagnose", "four_bar", "--start"]),
-    ("mbref", ["completion", "bash"]),
-    ("mbref", ["--version"]),
-    ("mbref", ["run", "--help"]),
+    ("mbref", ["list"]), ("mbref", ["schema"]), ("mbref", ["diagnose", "four_bar", "--start"]),
+    ("mbref", ["completion", "bash"]), ("mbref", ["--version"]), ("mbref", ["run", "--help"]),
     ("mbref", ["run", "four_bar", "--duration", "0.01", "--samples", "3", "--estimate", "no"]),
-    ("crosscheck", ["list", "metrics"]),
-    ("crosscheck", ["findings"]),
-    ("crosscheck", ["--version"]),
+    ("crosscheck", ["list", "metrics"]), ("crosscheck", ["findings"]), ("crosscheck", ["--version"]),
     ("crosscheck", ["closed-loops"]),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("program", "words"), PRINTING, ids=lambda x: x if isinstance(x, str) else " ".join(x)
 )
 def test_output_to_a_full_disk_ends_with_one_sentence(program, words, capsys):
+    """Linux refuses each byte that is written to /dev/full for want of space."""
     with open("/dev/full", "w") as full, redirect_stdout(full):
         assert PROGRAMS[program](words) == 2
     assert capsys.readouterr().err == "standard output: No space left on device\n"
 
 
-@pytest.mark.parametrize(("program", "words"), PRINTING[:2] + PRINTING[-1:])
-def test_output_to_a_closed_pipe_ends_with_one_sentence(program, words, capsys):
+@pytest.mark.parametrize(("program", "command"), [("mbref", "list"), ("crosscheck", "closed-loops")])
+def test_output_to_a_closed_pipe_ends_with_one_sentence(program, command, capsys):
+    """The end of the pipe that `head` or a pager would read is closed before the command writes."""
     reading, writing = os.pipe()
     os.close(reading)
     with os.fdopen(writing, "w") as pipe, redirect_stdout(pipe):
-        assert PROGRAMS[program](words) == 2
+        assert PROGRAMS[program]([command]) == 2
     assert capsys.readouterr().err == "standard output: Broken pipe\n"
 
 
-# escape, bell, an 8-bit escape, carriage return, right-to-left override
 @pytest.mark.parametrize("program", PROGRAMS)
 @pytest.mark.parametrize("word", ["\x1b[31mred", "a\x07b", "c\x9b2Jd", "r\rs", "\u202eback"])
 def test_errors_print_no_control_character_of_a_word_of_the_command_line(program, word, tmp_path, capsys):
+    """Escape, bell, an 8-bit escape, carriage return and right-to-left override would act on a terminal."""
     path = f"{tmp_path}/{word}.toml"
     for words in (["run", word], ["run", "four_bar", "--method", word], [word], ["run", path]):
         with suppress(SystemExit):

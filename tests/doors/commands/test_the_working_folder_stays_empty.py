@@ -28,7 +28,8 @@ IMPORT, FILES = (mbref, "import", "--out", "../a.toml"), (crosscheck, "files", "
     ],
 )
 def test_file_that_mujoco_warns_about_leaves_no_log(command, text, status, tmp_path, monkeypatch, capfd):
-    """MuJoCo writes its warnings to the terminal and to MUJOCO_LOG.TXT in the working folder."""
+    """MuJoCo writes warnings to the terminal and to MUJOCO_LOG.TXT in the working folder: here of an axis
+    that is no number, of a nearly singular mass matrix, and of an inertia that the armature cancels."""
     (tmp_path / "a.xml").write_text(text)
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")

@@ -60,8 +60,8 @@ def test_changes_beyond_noise_are_named_by_kind(changed: dict[str, Any], kinds: 
 
 
 def test_bisection_finds_the_change_past_versions_that_cannot_be_installed():
-    """Versions are 1.0 to 1.19, and 1.13 changes gravity. Halving takes 2 + log₂ 20 = 6 measurements, and up
-    to two more beside the missing 1.9 and 1.10. Among the first five versions nothing changes."""
+    """Versions are 1.0 to 1.19, and 1.13 changes gravity. Both ends and log₂ 20 halvings are at most seven
+    measurements; one more is beside the missing 1.9 and 1.10. From 1.0 to 1.4 nothing changes."""
     known = [f"1.{k}" for k in range(20)]
 
     def measure(version: str) -> Measured:
@@ -115,6 +115,7 @@ def test_bisection_by_the_command_names_the_release_with_the_wrong_gravity(four_
 
 @pytest.mark.slow
 def test_version_that_does_not_exist_is_refused_with_the_known_versions(four_versions: Path):
+    """The folder, the only source of packages, has wheels of 1.0 to 1.3."""
     stone = str(four_versions / "stone.toml")
     status, _, said = versions(four_versions, f"{PACKAGE}==1.0", f"{PACKAGE}==1.4", stone)
     assert status == 2 and "there is no such version; known: 1.0, 1.1, 1.2, 1.3" in said
@@ -131,7 +132,8 @@ def test_version_that_does_not_exist_is_refused_with_the_known_versions(four_ver
         (["a==1", "a==2", "--engine", "mujco"], "did you mean 'mujoco'?"),
     ],
 )
-def test_faulty_requests_are_refused_before_anything_is_installed(words, says, capsys):
+def test_faulty_request_for_versions_is_refused_with_its_right_form(words, says, capsys):
+    """One version, a package of two engines or of none, and misspelt options and engines."""
     assert main(["versions", *words]) == 2
     assert says in capsys.readouterr().err
 
