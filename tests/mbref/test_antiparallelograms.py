@@ -48,7 +48,7 @@ def four_bar(places, driver=None):
 @pytest.mark.parametrize("seed", range(10))
 def test_a_driven_crossed_four_bar_stays_crossed_through_flat_positions(seed):
     """The coupler's middle is midway between its pins, whose places at the crank's angle θ₀ + ω t are known
-    in closed form (``pins``). On the other branch, the parallelogram, it would be elsewhere."""
+    in closed form (``pins``), to ROUNDING. On the other branch, the parallelogram, it would be elsewhere."""
     crank, frame, angle, rate = drawn(seed)
     times = np.linspace(0.0, END, 31)
     run = simulate(four_bar(pins(crank, frame, angle), (0.0, rate)), "taylor", times, Limits(rtol=RTOL))
@@ -61,7 +61,7 @@ def test_a_driven_crossed_four_bar_stays_crossed_through_flat_positions(seed):
 @pytest.mark.parametrize("seed", range(6))
 def test_a_swinging_crossed_four_bar_stays_crossed_and_loses_no_energy(seed):
     """The coupler's middle is midway between its pins, whose places at the crank's angle are known in closed
-    form (``pins``). The energy is constant, to 100 rtol."""
+    form (``pins``), to ROUNDING. The energy is constant, to 100 rtol."""
     crank, frame, angle, rate = drawn(seed)
     scene = four_bar(pins(crank, frame, angle))
     spun = scene.with_(

@@ -22,17 +22,18 @@ from tests.helpers.statics import hinge, rod
 
 RATE = 124.8  # rad/s, of the driven crank
 ROUNDING = 1e-12  # m, of poses of about 0.5 m after some steps of 1e-15
-SLOW = 1e-8  # rad/s, rounding of rates of about 100 rad/s, magnified at singular positions
+RATES = 1e-8  # rad/s, rounding of rates of about 100 rad/s, magnified at singular positions
 LOST = 1e-8  # J, of a motion with about 5 J and rtol 1e-9
 
 
 def test_flat_rhombus_lists_its_smooth_and_its_folding_branch():
-    """At θ = π the coupler may fold on the crank, and the rocker rests: rates (ω, ω, 0). On the smooth branch
-    the coupler stays parallel: rates (ω, 0, ω). At θ = 0 the fold would need a crank at rest."""
+    """The rates of crank, coupler and rocker are known in closed form. At θ = π the coupler may fold on the
+    crank, and the rocker rests: (ω, ω, 0). On the smooth branch the coupler stays parallel: (ω, 0, ω). At θ =
+    0 the fold would need a crank at rest. Limits are rounding."""
     first, second = simulate(four_bar(), "taylor", [0.05]).crossings
     assert first.sentence == "one branch" and second.sentence == "2 branches" and second.taken == 1
     expected = np.array([[-RATE, 0.0, -RATE], [-RATE, -RATE, 0.0]])
-    assert np.abs(second.angular_velocity[:, :, 2] - expected).max() < SLOW
+    assert np.abs(second.angular_velocity[:, :, 2] - expected).max() < RATES
     assert np.abs(second.position[:, 1]).max() < ROUNDING, "all bodies lie on the x axis there"
 
 
@@ -45,7 +46,8 @@ def test_flat_five_bar_has_one_branch_at_every_crossing():
 
 def test_folding_branch_of_a_driven_rhombus_lays_the_coupler_on_the_crank():
     """Behind the crossing the middles of crank and coupler are both at L/2 (cos θ, sin θ), L = 0.5 m, and the
-    rocker rests; samples before the crossing do not depend on the branch that is asked for."""
+    rocker rests. Samples before the crossing do not depend on the branch that is asked for. Limits are
+    rounding."""
     times = np.linspace(0.0, 0.06, 241)
     smooth = simulate(four_bar(), "taylor", times)
     fold = simulate(four_bar(), "taylor", times, Limits(branches={2: 2}))
@@ -56,12 +58,12 @@ def test_folding_branch_of_a_driven_rhombus_lays_the_coupler_on_the_crank():
     tip = 0.25 * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     assert np.abs(fold["crank"].position[behind] - tip).max() < ROUNDING
     assert np.abs(fold["coupler"].position[behind] - tip).max() < ROUNDING
-    assert np.abs(fold["rocker"].angular_velocity[behind]).max() < SLOW
+    assert np.abs(fold["rocker"].angular_velocity[behind]).max() < RATES
 
 
 def test_second_branch_of_a_swinging_rhombus_keeps_the_energy_and_leaves_the_smooth_motion():
-    """Gravity and rigid joints lose no energy. Up to the crossing the poses are those of the smooth branch;
-    from the second sample after it they differ by more than 1 mm."""
+    """Gravity and rigid joints lose no energy, to 2 rtol. Up to the crossing the poses are those of the
+    smooth branch, to rounding; from the second sample after it they differ by more than 1 mm."""
     scene, times = four_bar_gravity(0.3), np.linspace(0.0, 1.0, 41)
     run = simulate(scene, "taylor", times, Limits(branches={1: 2}))
     assert run.outcome.label == "COMPLETED" and run.crossings[0].taken == 2
@@ -73,19 +75,20 @@ def test_second_branch_of_a_swinging_rhombus_keeps_the_energy_and_leaves_the_smo
 
 @pytest.mark.parametrize("loops", [2, 3])
 def test_chain_flat_in_all_loops_lists_the_smooth_branch_and_the_fold_of_its_first_loop(loops):
-    """All links lie on one line. On the smooth branch all uprights turn; where the first loop folds,
-    its first upright alone rests. The sentence says that there are further branches."""
+    """All links lie on one line. On the smooth branch all uprights turn; where the first loop folds, its
+    first upright alone rests, to rounding. The sentence says that there are further branches."""
     run = simulate(four_bar_chain(loops), "taylor", [1.0])
     (crossing,) = run.crossings
     assert np.abs(crossing.position[:, 1]).max() < ROUNDING
     assert crossing.sentence == "2 branches and others that second order does not determine"
-    resting = np.abs(crossing.angular_velocity[:, : loops + 1, 2]) < SLOW
+    resting = np.abs(crossing.angular_velocity[:, : loops + 1, 2]) < RATES
     assert not resting[0].any() and resting[1].tolist() == [True] + [False] * loops
 
 
 @pytest.mark.parametrize("loops", [2, 3])
 def test_second_branch_of_a_chain_folds_its_first_loop_and_keeps_the_energy(loops):
-    """In the folded loop the middles of bar and second upright coincide."""
+    """In the folded loop the middles of bar and second upright coincide, to rounding. Gravity and rigid
+    joints lose no energy, to 2 rtol."""
     scene, times = four_bar_chain(loops), np.linspace(0.0, 1.0, 21)
     run = simulate(scene, "taylor", times, Limits(branches={1: 2}))
     assert run.outcome.label == "COMPLETED" and np.ptp(run.energy) < LOST

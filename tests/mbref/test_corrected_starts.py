@@ -30,7 +30,8 @@ def pairs(count, gap=0.0, **of_first):
 
 @pytest.mark.parametrize("count", PAIRS)
 def test_gap_closes_by_displacements_in_inverse_ratio_of_the_masses(count):
-    """A gap g between masses 1 and 3 closes by 3/4 g and 1/4 g: least Σ m |x|², with x₁ - x₂ = g."""
+    """A gap g between masses 1 and 3 closes by 3/4 g and 1/4 g: least Σ m |x|², with x₁ - x₂ = g, to
+    ACCURACY. One pair is solved by dense matrices, many pairs by sparse ones (PAIRS)."""
     model, gap = pairs(count), 1e-3
     q = model.start().copy().reshape(-1, 2, 7)
     q[:, 1, 2] += gap
@@ -44,8 +45,9 @@ def test_gap_closes_by_displacements_in_inverse_ratio_of_the_masses(count):
 
 @pytest.mark.parametrize("count", PAIRS)
 def test_missing_velocities_minimise_the_kinetic_energy(count):
-    """The mass is given 1 m/s across the rod, the rod nothing: least kinetic energy gives its centre the
-    velocity I / (I + m l²) and the rod the rate -m l / (I + m l²)."""
+    """The mass is given 1 m/s across the rod, the rod nothing. By least kinetic energy its centre has the
+    velocity I / (I + m l²) and the rod the rate -m l / (I + m l²), to ACCURACY. One pair is solved by dense
+    matrices, many by sparse ones (PAIRS)."""
     found = consistent_start(pairs(count, velocity=(1.0, 0.0, 0.0)))
     v = found.v.reshape(-1, 2, 6)
     effective = INERTIA + 3.0 * ARM**2

@@ -42,7 +42,7 @@ def test_chains_have_the_counts_of_their_formulas(loops):
 
 @pytest.mark.parametrize("name", PAPER)
 def test_ground_as_frame_saves_six_coordinates_and_rows(name):
-    """As a body the ground has six coordinates, and six rows hold it."""
+    """As a body the ground has six coordinates, and six rows hold it. The scenes are those of the paper."""
     scene = SCENES[name]()
     frame, body = mbref.counts(scene), mbref.counts(scene.with_(ground="body"))
     assert (body.coordinates - frame.coordinates, body.rows - frame.rows) == (6, 6)

@@ -55,7 +55,8 @@ def test_coupling_takes_the_angle_of_a_joint_that_has_one_and_otherwise_the_disp
     ],
 )
 def test_fault_of_a_coupling_is_named_by_its_field(change, fault):
-    """A right coupling `teeth` of the hinges A and B gets one change, which is the only fault reported."""
+    """A right coupling `teeth` of the hinges A and B gets one change, which is the only fault reported.
+    NO_END and NO_SLIDE are the rest of a sentence."""
     entry = {"name": "teeth", "joints": ["A", "B"], "ratio": -0.5} | change
     with pytest.raises(SceneError) as found:
         gear_pair(coupling=[entry])

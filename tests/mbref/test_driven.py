@@ -27,8 +27,8 @@ def flat_times(end):
 )
 @pytest.mark.parametrize("name", ["four_bar", "five_bar"])
 def test_every_flat_position_of_a_driven_parallelogram_is_recorded_at_its_time(name, limits):
-    """Poses meet the parallelogram's closed form. The crank passes 40 half turns in 1 s; at each recorded
-    time it is within 1e-9 rad of one."""
+    """Poses meet the parallelogram's closed form to rounding. The crank passes 40 half turns in 1 s; at each
+    recorded time it is within 1e-9 rad of one."""
     scene = SCENES[name]()
     run = simulate(scene, "taylor", np.linspace(0.0, 1.0, 9), Limits(**limits))
     assert relative_error(run, scene) < ROUNDING
@@ -65,7 +65,7 @@ def test_accelerations_of_a_driven_crank_and_rod_of_equal_length_are_the_closed_
 
 
 def test_prescribed_motion_does_not_depend_on_the_tolerance():
-    """Runs with rtol 1e-3 and 1e-11 agree to the bit, and have the judge's closed form."""
+    """Runs with rtol 1e-3 and 1e-11 agree to the bit, and have the judge's closed form, to rounding."""
     scene, times = SCENES["spatial_slider_crank_driven"](), np.linspace(0.0, 0.2, 5)
     rough, fine = (simulate(scene, "taylor", times, Limits(rtol=rtol)) for rtol in (1e-3, 1e-11))
     assert np.array_equal(rough.position, fine.position) and rough.cost.steps == fine.cost.steps

@@ -163,7 +163,8 @@ def test_killed_process_loses_only_the_call_that_killed_it():
 
 @pytest.mark.slow
 def test_interrupt_ends_calls_of_processes_that_still_run():
-    """The call would sleep for a day; without the interrupt's effect on it, this test does not end."""
+    """The call would sleep for a day; without the interrupt's effect on it, this test does not end. It is
+    cancelled, or broken off if its process has begun it."""
     with pytest.raises(KeyboardInterrupt), processes(1) as pool:
         call = pool.submit(time.sleep, 86400.0)
         raise KeyboardInterrupt

@@ -27,7 +27,8 @@ def test_a_damped_torsion_spring_has_the_roots_of_its_equation():
 
 
 def test_scene_of_an_equilibrium_counts_angles_from_its_pose_and_is_its_own_equilibrium():
-    """The arm rests at 0.4 rad, from where its natural angle is 0."""
+    """The arm of 0.7 m rests at 0.4 rad, where its spring is relaxed, to rounding (POSE). The scene returned
+    has the arm there and the natural angle 0."""
     [each] = equilibria(damped_spring(), starts=1)
     place = ARM * np.array([np.cos(0.4), np.sin(0.4), 0.0])
     assert np.allclose(each.scene.body[0].position, place, atol=POSE)
@@ -68,7 +69,8 @@ def test_vibration_keeps_the_constraints_and_returns_after_its_period():
 
 
 def test_command_equilibrium_prints_stability_and_reactions_and_writes_the_pose(tmp_path, capsys):
-    """The pendulum rests below and above its hinge, which carries m g = 19.62 N. The file has one of both."""
+    """The pendulum rests below and above its hinge, which carries m g = 19.62 N. The file has one of both
+    poses, to rounding (POSE)."""
     path, rest = (str(tmp_path / name) for name in ("my.toml", "rest.toml"))
     pendulum().save(path)
     assert main(["equilibrium", path, "--starts", "6", "--out", rest]) == 0

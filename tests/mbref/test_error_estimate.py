@@ -144,8 +144,8 @@ def test_motion_at_a_singular_position_has_its_true_error_as_its_estimate(name, 
 
 
 def test_start_of_the_second_run_differs_by_rounding_and_keeps_zeros(pendulums):
-    """Each number x changes by one to two roundings, at most 2.5 · 2⁻⁵² |x|, so that zeros stay; more than
-    ten numbers change, equally in each call."""
+    """Each number x changes by one to two roundings, at most 2.5 · 2⁻⁵² |x| (UNIT is 2⁻⁵²), so that zeros
+    stay. More than ten numbers change, equally in each call."""
 
     def numbers(scene: Scene) -> np.ndarray:
         fields = [b.position + b.inertia for b in scene.body] + [j.anchor + j.axis for j in scene.joint]

@@ -42,7 +42,8 @@ def difference(scene, method=ORDER_16, rtol=1e-11):
 
 @pytest.mark.parametrize("seed", (3, 11, 17, 21))
 def test_generated_code_moves_random_mechanisms_without_springs_as_the_general_kernels(seed):
-    """``difference`` is of positions by both codes, over the length; their sums have other orders."""
+    """``difference`` is of positions by both codes, over the length; their sums have other orders, so that
+    rounding is left."""
     scene = random_mechanism(seed)
     loads = tuple(load for load in scene.load if not hasattr(load, "stiffness"))
     assert difference(scene.with_(load=loads)) <= ROUNDING
@@ -51,7 +52,8 @@ def test_generated_code_moves_random_mechanisms_without_springs_as_the_general_k
 @pytest.mark.parametrize("name", ("bricard", "bennett"))
 def test_generated_code_follows_a_motion_that_turns_back(name):
     """Generated code uses the power equation, except at low speed, where the motion turns back: the
-    velocities, projected on their first values, change their sign. The general kernels are the truth."""
+    velocities, projected on their first values, change their sign. Positions are the general kernels', to
+    rounding."""
     times, rtol = np.linspace(0.0, 4.0, 41), 1e-11
     generic, own = (
         simulate(SCENES[name](), "taylor", times, Limits(rtol=rtol, code=code))

@@ -35,7 +35,7 @@ def difference(matrix: np.ndarray, rhs: np.ndarray) -> float:
 @pytest.mark.parametrize("seed", range(5))
 def test_least_norm_solution_and_null_space_are_given_by_the_pseudo_inverse(seed, rows, columns, rank):
     """The function ``least_norm_and_null_space`` against NumPy's pseudo-inverse A⁺: A⁺ b and I - A⁺ A, for
-    matrices with full and with deficient rank."""
+    matrices with full and with deficient rank, to rounding."""
     matrix = unit_rows(seed, rows, columns, [1.0] * rank)
     assert difference(matrix, matrix @ np.random.default_rng(seed).normal(size=columns)) < ROUNDING
 
@@ -49,7 +49,8 @@ def test_singular_value_counts_only_above_the_tolerance(least):
 
 
 def test_contradicting_equations_have_the_least_squares_solution():
-    """Each equation is there twice with different right-hand sides; the pseudo-inverse takes their mean."""
+    """Each equation is there twice with different right-hand sides; NumPy's pseudo-inverse takes their mean,
+    to rounding."""
     matrix = np.vstack([unit_rows(1, 4, 6, [1.0] * 4)] * 2)
     assert difference(matrix, np.random.default_rng(1).normal(size=8)) < ROUNDING
 
@@ -71,7 +72,8 @@ def test_tolerance_is_relative_to_the_largest_singular_value():
 
 @pytest.mark.parametrize("seed", range(5))
 def test_basis_of_a_null_space_depends_on_the_space_alone(seed):
-    """Equations in another order, combined with each other, have the basis of the first ones."""
+    """Equations in another order, combined with each other, have the basis of the first ones, to rounding. It
+    is orthonormal."""
     random = np.random.default_rng(seed)
     matrix = random.normal(size=(4, 9))
     basis = null_space(matrix, TOLERANCE)

@@ -28,7 +28,7 @@ def crank() -> Motion:
 
 def test_angle_of_a_joint_does_not_depend_on_the_sign_of_quaternions(driven):
     """p and -p are one orientation. Signs of all bodies are changed, then of the crank alone at samples 1, 2,
-    4, 5 …: the angle of joint A stays."""
+    4, 5 …: the angle of joint A stays, to rounding."""
     other = Motion.of(driven.mechanism, dataclasses.replace(driven, orientation=-driven.orientation))
     crank_alone = driven.orientation * np.array([-1.0, 1.0, 1.0])[:, None]
     one = Motion.of(driven.mechanism, dataclasses.replace(driven, orientation=crank_alone))
@@ -37,7 +37,8 @@ def test_angle_of_a_joint_does_not_depend_on_the_sign_of_quaternions(driven):
 
 
 def test_displacement_of_a_guide_is_how_far_its_slider_moved(crank):
-    """The guide D is along x; it has no angle."""
+    """The guide D is along x, so that x of the slider changes by the displacement, to rounding; it has no
+    angle."""
     joint, slider = crank.joint("D"), crank["slider"]
     assert np.allclose(joint.displacement, slider.position[:, 0] - slider.position[0, 0], atol=ROUNDING)
     assert joint.angle is None and joint.displacement[-1] != 0
@@ -83,7 +84,8 @@ FAULTS = {"t_end": "soon", "angles": {"A": [0.0]}, "cost": {"steps": "3"}, "bodi
 
 @pytest.mark.parametrize("field", [None, *FAULTS])
 def test_file_that_is_no_saved_motion_is_refused(field, crank, tmp_path):
-    """It has no record, or a record in which one field has a value of another kind or length."""
+    """It has no record (None), or a record in which one field has a value of another kind or length
+    (FAULTS)."""
     whole = {"scene": crank.mechanism.to_dict(), "record": {**crank.to_record(), field: FAULTS.get(field)}}
     (tmp_path / "other.json").write_text(json.dumps(whole if field else {"scene": 1}))
     with pytest.raises(ValueError, match=r"other\.json: is not a file that Motion\.save wrote"):

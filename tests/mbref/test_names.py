@@ -25,7 +25,8 @@ NAMES = (
 
 @pytest.mark.parametrize("name", NAMES)
 def test_run_s_table_shows_a_name_literally(name: str, capsys: pytest.CaptureFixture[str]):
-    """The scene, its body, the method and the message of the run have this name: it is shown four times."""
+    """The scene, its body, the method and the message of the run have this name: it is shown four times.
+    NAMES look like markup of terminals, HTML and formulas, or like paths."""
     body = Body(name=name, mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
     still = np.zeros((1, 1, 3))
     first = (name, "mbref", "1", name, {}, np.zeros(1), (name,))

@@ -57,8 +57,9 @@ STARTS = {
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("of", STARTS)
 def test_coupled_coordinates_start_by_the_least_displacement_and_move_from_there(of, method):
-    """The least J a² + m b² with b = c + r a, c the offset, has a = -r m c / J' and b = J c / J'. From there
-    a torque or a weight moves them with the constant acceleration that STARTS gives."""
+    """The least J a² + m b² with b = c + r a, c the offset, has a = -r m c / J' and b = J c / J', to 0.5 %
+    (STEPS), as it is found in finite steps. From there a torque or a weight moves them with the constant
+    acceleration that STARTS gives, to rounding (CLOSED_FORM). METHODS are Taylor series and a formulation."""
     make, name, offset, ratio, end, first, second, force = STARTS[of]
     times, inertia = np.linspace(0, end, 11), first + ratio**2 * second
     motion = mbref.simulate(shifted(make, name, offset), method=method, times=times, rtol=1e-13)
@@ -72,8 +73,9 @@ def test_coupled_coordinates_start_by_the_least_displacement_and_move_from_there
 
 @every
 def test_assembled_scene_has_no_offset_and_moves_as_the_scene_with_offset(make, name, offset):
-    """It satisfies the joints, has the counts of the scene without offset, and is its own assembly. A run of
-    the scene with offset begins at this pose, so that both motions are equal to the bit."""
+    """It satisfies the joints to rounding (CLOSED_FORM), has the counts of the scene without offset, and is
+    its own assembly. A run of the scene with offset begins at this pose, so that both motions are equal to
+    the bit."""
     scene = shifted(make, name, offset)
     found = mbref.assembled(scene)
     assert mbref.assembled(found) is found and mbref.counts(found) == mbref.counts(make())
@@ -85,7 +87,7 @@ def test_assembled_scene_has_no_offset_and_moves_as_the_scene_with_offset(make, 
 
 
 def test_offset_moves_the_wheel_that_is_not_driven():
-    """A driver turns A by t; B is at 0.4 - 0.5 t."""
+    """A driver turns A by t; B is at 0.4 - 0.5 t, the offset and the ratio, to rounding (CLOSED_FORM)."""
     scene = shifted(gear_pair, "teeth", 0.4).with_(driver=[{"joint": "A", "polynomial": [0.0, 1.0]}])
     motion = mbref.simulate(scene, times=[0.0, 0.5])
     assert error(motion.joint("A").angle, np.array([0.0, 0.5])) <= CLOSED_FORM
@@ -95,8 +97,8 @@ def test_offset_moves_the_wheel_that_is_not_driven():
 @pytest.mark.parametrize("offset", [0.4, 8.0])
 def test_natural_angle_of_a_spring_counts_from_the_pose_in_the_file(offset):
     """A spring of 3 N m/rad that is relaxed at the assembled start leaves the wheels at rest, also for an
-    offset of more than a turn (rad). There A is at -r J_B c / J, r = -0.5, J_B = 0.2 kg m², J = 0.08 kg
-    m²."""
+    offset of more than a turn (rad). There A is at -r J_B c / J, r = -0.5, J_B = 0.2 kg m², J = 0.08 kg m²,
+    to 0.5 % (STEPS)."""
     scene = shifted(gear_pair, "teeth", offset)
     at = mbref.simulate(scene, times=[0.0]).joint("A").angle[0]
     assert at == pytest.approx(0.5 * 0.2 / 0.08 * offset, rel=STEPS)

@@ -61,7 +61,8 @@ def sprung() -> Motion:
 
 
 def test_length_rate_and_force_of_a_spring_follow_from_geometry(sprung):
-    """The law of cosines between the post and the tip of the rod."""
+    """The law of cosines between the post and the tip of the rod, to rounding (ACCURACY). Force and power are
+    k (l - l₀) + c l' and -F l'."""
     theta, turning, _ = angle(TIMES)
     tip = 1.2 * np.stack([np.cos(theta), np.sin(theta)], axis=1)
     speed = 1.2 * turning[:, None] * np.stack([-np.sin(theta), np.cos(theta)], axis=1)
@@ -95,8 +96,8 @@ def test_armature_changes_neither_violations_nor_determined_reactions():
 
 @pytest.mark.parametrize("ground", ["frame", "body"])
 def test_violation_is_the_distance_by_which_a_body_is_out_of_its_plane(ground):
-    """The rod is moved across the plane at the second of three samples: by 1 mm, 1 cm/s and 0.1 m/s². A
-    motion without accelerations has no violation of them."""
+    """The rod is moved across the plane at the second of three samples: by 1 mm, 1 cm/s and 0.1 m/s², which
+    are the violations to rounding (ACCURACY). A motion without accelerations has no violation of them."""
     motion = simulate(find_scene("planar_slider_crank").with_(ground=ground), times=TIMES[:3] / 10)
     for level, size in {"position": 1e-3, "velocity": 1e-2, "acceleration": 0.1}.items():
         moved = getattr(motion, level).copy()

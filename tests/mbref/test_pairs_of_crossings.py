@@ -23,8 +23,8 @@ def angles(run) -> np.ndarray:
 @pytest.mark.parametrize("apart", APART)
 def test_flat_positions_of_two_loops_within_one_step_are_both_recorded(apart, method, rtol):
     """Each loop is flat where the crank is in line with the loop's frame. The crank swings down from 0.3 rad
-    to π - 0.3 rad and back. It passes 0, where the first loop is flat, and ``apart``, the angle of the second
-    loop's frame; half a turn later it passes both again."""
+    to π - 0.3 rad and back. It passes 0, where the first loop is flat, and ``apart`` (rad), the angle of the
+    second loop's frame; half a turn later it passes both again. Angles agree to POSITION, 1e-9 rad."""
     run = simulate(two_rhombi(apart), method, [1.0], Limits(rtol=rtol, code="generic"))
     assert run.outcome.label == "COMPLETED", run.message
     expected = sorted((0.0, apart), reverse=True) + sorted((0.0, -apart))
@@ -35,8 +35,8 @@ def test_flat_positions_of_two_loops_within_one_step_are_both_recorded(apart, me
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("number", [1, 2])
 def test_second_branch_is_taken_at_the_first_or_second_of_two_crossings_in_a_step(number, method):
-    """Up to the crossing of its loop a coupler is parallel to its frame; on the second branch it turns, here
-    by more than 0.1 rad. Gravity and rigid joints lose no energy, to 100 rtol."""
+    """Up to the crossing of its loop a coupler is parallel to its frame, to POSITION, 1e-9 rad; on the second
+    branch it turns, here by more than 0.1 rad. Gravity and rigid joints lose no energy, to 100 rtol."""
     apart, times, rtol = -2e-2, np.linspace(0.0, 0.6, 61), 1e-9
     limits = Limits(rtol=rtol, branches={number: 2}, code="generic")
     run = simulate(two_rhombi(apart), method, times, limits)

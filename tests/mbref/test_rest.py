@@ -27,8 +27,8 @@ def flat_parallelogram(moment: float) -> Scene:
 
 def test_flat_parallelogram_at_rest_turns_as_its_crank_is_pushed():
     """The branch of the parallelogram has less inertia than the other: 2 (0.1 + 0.5² kg m²) of the cranks and
-    1 kg m² of the coupler, so that 5 N m give 5 / 1.7 rad/s². Later samples are compared with the judge's
-    closed form. The message states the choice."""
+    1 kg m² of the coupler, so that 5 N m give 5 / 1.7 rad/s². Later samples are the judge's closed form, to
+    rounding. The message states the choice."""
     scene = flat_parallelogram(5.0)
     run = simulate(scene, "taylor", TIMES)
     assert relative_error(run, scene) < ROUNDING and len(run.times) == len(TIMES)
@@ -38,13 +38,14 @@ def test_flat_parallelogram_at_rest_turns_as_its_crank_is_pushed():
 
 
 def test_first_sample_after_the_start_may_be_later_than_zero():
-    """A run of the same motion whose first sample is at 10 µs, against the judge's closed form."""
+    """A crank of a flat parallelogram is pushed from rest by 5 N m; the first sample is at 10 µs. Samples are
+    the judge's closed form, to rounding."""
     scene = flat_parallelogram(5.0)
     assert relative_error(simulate(scene, times=[1e-5, 0.5]), scene) < ROUNDING
 
 
 def test_flat_parallelogram_without_forces_stays_and_no_branch_is_chosen():
-    """Nothing pushes it; the message states no choice."""
+    """Nothing pushes it, so that it moves by rounding alone; the message states no choice."""
     run = simulate(flat_parallelogram(5.0).with_(load=()), times=TIMES)
     assert run.outcome.label == "COMPLETED" and np.ptp(run.position, axis=0).max() < ROUNDING
     assert "begins at rest" not in run.message

@@ -39,8 +39,9 @@ MECHANISMS = (SCENES["spatial_slider_crank_gravity"](), RAIL, SLEEVE, WELD, TWO_
 
 @pytest.mark.parametrize("scene", MECHANISMS, ids=lambda scene: scene.name)
 def test_alf_dual_moves_as_the_reference_and_shares_redundant_forces_by_the_least_norm(scene):
-    """Positions are the judge's, to 100 rtol (m). Reactions are those of the dense pseudo-inverse (MPI-SVD),
-    which leaves out no coordinate and has the least norm for redundant rows, to 1e-5 of the largest."""
+    """MECHANISMS have coordinates that stay constant. Positions are the judge's, to 100 rtol (m). Reactions
+    are those of the dense pseudo-inverse (MPI-SVD), which leaves out no coordinate and has the least norm for
+    redundant rows, to 1e-5 of the largest."""
     times, rtol = np.linspace(0.0, 0.1, 5), 1e-11
     one, other = (simulate(scene, m, times, Limits(rtol=rtol)) for m in (METHOD, "mpi-svd+none"))
     assert one.outcome.name == other.outcome.name == "COMPLETED", one.message
@@ -62,7 +63,7 @@ def test_driver_of_a_welded_joint_ends_the_run_before_it_turns_anything():
 
 @pytest.mark.parametrize("method", (METHOD, "lm2+projection/adams", "taylor"))
 def test_welded_body_stays_and_its_weld_carries_the_weight(method):
-    """A body of 2 kg: 2 · 9.81 N along y."""
+    """A body of 2 kg: 2 · 9.81 N along y, by three methods."""
     body = Body(name="b", position=(1, 0, 0), mass=2, inertia=(1, 2, 3))
     weld = Fixed(name="W", bodies=("ground", "b"), anchor=(0, 0, 0))
     scene = Scene(name="welded", gravity=(0, -9.81, 0), joint=(weld,), body=(body,))

@@ -90,7 +90,8 @@ def faults_of(data):
 
 @pytest.mark.parametrize(("path", "value", "reported"), FAULTS)
 def test_fault_is_reported_once_under_its_path(path, value, reported):
-    """A renamed joint or body also breaks the entries that refer to it; they have faults of their own."""
+    """FAULTS has a path in a right scene, its wrong value, and the path that is reported. A renamed joint or
+    body also breaks the entries that refer to it; they have faults of their own."""
     faults = faults_of(changed((path, value)))
     assert sum(fault.startswith(f"{reported}: ") for fault in faults) == 1, faults
 

@@ -69,8 +69,8 @@ def test_orientation_of_every_sample_is_a_unit_quaternion(method):
 
 @pytest.mark.parametrize("method", ["mpi-svd+projection", "lm1+partitioning", "lm1+none"])
 def test_bodies_without_masses_follow_their_drivers(method):
-    """The block's place is (r cos φ, r sin φ) with the driven r = 1 + 2 t and φ = t + t² / 2 + sin(3 t) /
-    2."""
+    """The block's place is (r cos φ, r sin φ) with the driven r = 1 + 2 t and φ = t + t² / 2 + sin(3 t) / 2,
+    to 100 rtol (m)."""
     sine = Sine(amplitude=0.5, frequency=3.0)
     hinge = Revolute(name="H", bodies=("ground", "arm"), anchor=(0, 0, 0), axis=(0, 0, 1))
     slide = Translational(name="S", bodies=("arm", "block"), anchor=(1, 0, 0), axis=(1, 0, 0))

@@ -90,7 +90,8 @@ PLACES = [
     ("scene", "path"), [pytest.param(*case, id=f"{case[0].name} {case[1]}") for case in PLACES]
 )
 def test_variants_of_a_place_or_ratio_together_equal_single_runs(scene, path):
-    """Seven of eight variants are in a batch with the first, though each has a number of its own there."""
+    """PLACES are numbers on which lengths, moments or couplings depend. Seven of eight variants are in a
+    batch with the first, though each has a number of its own there."""
     mean = number_at(scene, path)
     scenes = list(variants(scene, [Variation(path, mean, 1e-5 * abs(mean), normal=True)], 8))
     assert not compared(scenes, np.linspace(0.0, 0.01, 3), method="taylor").differing

@@ -116,8 +116,8 @@ def test_small_bead_on_an_arm_swings_without_a_singular_position(inertia):
 def test_swing_that_turns_back_before_the_flat_position_meets_its_closed_form_and_crosses_nothing(
     loop, distance
 ):
-    """A parallelogram released ``distance`` (rad) from the flat pose, on the side where it swings back.
-    Errors against the judge's closed form are below ten rtol."""
+    """SWINGING are parallelograms of four and five bars, released ``distance`` (rad) from the flat pose, on
+    the side where they swing back. Errors against the judge's closed form are below ten rtol."""
     scene = SWINGING[loop](-distance)
     run = simulate(scene, "taylor", np.linspace(0.0, 1.5, 9))
     assert relative_error(run, scene) < 10 * RTOL and run.crossings == ()
@@ -139,8 +139,9 @@ def test_crossings_of_a_chain_flat_in_both_loops_are_all_recorded(rtol):
 
 @pytest.mark.parametrize("loop", SWINGING)
 def test_release_very_near_the_flat_position_is_right_or_undecided(loop):
-    """Distances of 1e-8 to 1e-5 rad: below 5e-6 rad rounding may turn the motion from rest, and a run may end
-    UNDECIDED; its message says so if it ends at the start. Right means off by at most 1000 rtol."""
+    """SWINGING are parallelograms of four and five bars, released 1e-8 to 1e-5 rad from flat. Below 5e-6 rad
+    rounding may turn the motion from rest, and a run may end UNDECIDED; its message says so if it ends at the
+    start. Right means off by at most 1000 rtol from the judge's closed form."""
     for distance in np.geomspace(1e-8, 1e-5, 16):
         scene = SWINGING[loop](-distance)
         run = simulate(scene, "taylor", np.linspace(0.0, 1.5, 21))
@@ -184,15 +185,17 @@ def test_swing_that_turns_back_within_its_tolerance_is_right_or_undecided(rtol):
 @pytest.mark.parametrize("loop", SWINGING)
 @pytest.mark.parametrize("distance", [3e-5, 1e-4])
 def test_swing_through_two_flat_positions_from_near_one_meets_its_closed_form(loop, distance):
-    """Released from rest ``distance`` (rad) behind a flat position, on the side on which it falls to the
-    other one and comes back. Nearer than 1e-5 rad rounding may decide on the branch."""
+    """SWINGING are parallelograms of four and five bars, released from rest ``distance`` (rad) behind a flat
+    position, on the side on which they fall to the other one and come back. Nearer than 1e-5 rad rounding may
+    decide on the branch. The judge's closed form is met to ten rtol."""
     assert error_of(SWINGING[loop](distance), 1.5) < 10 * RTOL
 
 
 @pytest.mark.parametrize("loop", SWINGING)
 @pytest.mark.parametrize("distance", [1e-7, 1e-8])
 def test_motion_from_very_near_the_flat_position_is_undecided_at_its_start(loop, distance):
-    """Released from rest ``distance`` (rad) from it: rounding of 1e-16 over the squared distance decides."""
+    """SWINGING are parallelograms of four and five bars, released from rest ``distance`` (rad) from it:
+    rounding of 1e-16 over the squared distance decides."""
     run = simulate(SWINGING[loop](distance), "taylor", [0.0, 1.5])
     assert run.outcome.label == "UNDECIDED" and not len(run.times)
     assert "singular position at t = 0 s" in run.message
@@ -207,8 +210,8 @@ LOOSE = 1e-5  # rtol of long steps
 )
 def test_slider_crank_with_a_longer_rod_turns_past_its_dead_centre_as_its_closed_form(gap, rtol):
     """The rod is longer than the crank by the gap (m), so that branches do not meet, apart by about √gap.
-    Long steps of a loose tolerance must not change the branch: the slider would be off by its stroke, 0.6 m.
-    The error is below rtol."""
+    Long steps of a loose tolerance (LOOSE, 1e-5) must not change the branch: the slider would be off by its
+    stroke, 0.6 m. The error against the judge's closed form is below rtol."""
     scene = slider_crank(0.308, 0.308 + gap, 0.3, "gap", rate=30.0)
     assert error_of(scene, 0.25, rtol=rtol) < rtol
 
@@ -244,8 +247,8 @@ def test_small_bead_on_a_cart_keeps_the_energy(inertia):
     [(0.3, 2.5), (1e-2, 2.5), (math.pi - 1e-3, 2.5), (math.pi + 1e-4, 0.1), (math.pi + 1e-6, 0.1)],
 )
 def test_driven_parallelogram_crosses_from_any_angle_as_its_closed_form(loop, angle, end):
-    """Crank and rocker turn by the driver's angle, and the coupler does not turn; in 2.5 s rounding adds up
-    over a hundred flat positions: 100 times 1e-13."""
+    """DRIVEN are parallelograms of four and five bars. Crank and rocker turn by the driver's angle, and the
+    coupler does not turn; in 2.5 s rounding adds up over a hundred flat positions: 100 times 1e-13."""
     assert error_of(DRIVEN[loop](angle), end) < 100 * 1e-13
 
 

@@ -46,8 +46,9 @@ def first_crossing(scene: Scene, end: float) -> float:
 @pytest.mark.parametrize("method", WATCHING)
 @pytest.mark.parametrize("loop", LOOPS)
 def test_run_that_watches_the_rank_ends_at_the_first_singular_position(loop, method):
-    """The run ends within 0.2 % of its duration at the closed form's first singular time, uncrossed; the
-    message names a method that crosses."""
+    """WATCHING are methods that claim no crossing. LOOPS, two parallelograms and a slider-crank, end
+    uncrossed, within 0.2 % of their duration at the closed form's first singular time. The message names a
+    method that crosses."""
     scene, end = LOOPS[loop]
     time = first_crossing(scene, end)
     run = simulate(scene, method, np.linspace(0.0, end, 41))
@@ -66,8 +67,8 @@ def test_run_that_watches_the_rank_ends_at_the_first_singular_position(loop, met
     ids=lambda scene: scene.name,
 )
 def test_message_names_the_joints_that_lose_rank_and_no_joint_beside_them(scene):
-    """All joints of a loop take part where its links are in line; three loops of a chain are flat at once.
-    The hinge of a pendulum beside them does not."""
+    """All joints of a loop take part where its links are in line: in a four-bar, a five-bar, and three loops
+    of a chain that are flat at once. The hinge of a pendulum beside them does not."""
     beside = (rod("bob", (9.0, 0.0, 0.0), (9.5, 0.0, 0.0)), hinge("beside", "ground", "bob", (9.0, 0.0, 0.0)))
     both = Scene.model_validate(
         {**scene.model_dump(), "body": [*scene.body, beside[0]], "joint": [*scene.joint, beside[1]]}
@@ -82,8 +83,9 @@ FAILURES = ("LEFT_MOTION", "NOT_CONVERGED", "STEP_FAILED")  # rounding decides w
 @pytest.mark.parametrize("method", REGULARISED)
 @pytest.mark.parametrize("loop", LOOPS)
 def test_regularised_method_meets_the_closed_form_after_the_singular_position_or_fails(loop, method):
-    """It claims to cross by regularisation. A run completes within 1000 times rtol, 1e-8, or reports that it
-    failed or left its motion."""
+    """REGULARISED are methods that claim to cross by regularisation, LOOPS two parallelograms and a
+    slider-crank. A run completes within 1000 times rtol, 1e-8, or reports that it failed or left its
+    motion."""
     scene, end = LOOPS[loop]
     assert Method.parse(method).crosses == "by regularisation"
     run = simulate(scene, method, np.linspace(0.0, end, 21), Limits(rtol=1e-8))

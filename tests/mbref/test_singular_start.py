@@ -33,22 +33,24 @@ def upright_slider_crank(rod: float | None) -> Scene:
 @pytest.mark.parametrize("angle", [0.0, math.pi, -math.pi])
 def test_driven_loop_starts_flat_and_moves_as_its_closed_form(linkage, angle):
     """Crank and rocker turn by 12.5 rad, the driver's angle, and pass three more flat positions; the coupler
-    does not turn."""
+    does not turn. The judge's closed form is met to rounding."""
     scene = linkage(angle)
     run = simulate(scene, "taylor", np.linspace(0.0, 0.1, 21), Limits(rtol=1e-9))
     assert relative_error(run, scene) < ROUNDING and len(run.crossings) == 3
 
 
 def test_crank_that_starts_upright_moves_its_slider_as_the_closed_form():
-    """The rod turns against the crank at -30 rad/s, so that the slider moves. In 0.5 s the crank turns by 15
-    rad and is upright or hangs seven times more; the judge's closed form has only the angle of the crank."""
+    """Crank and rod of equal length are upright. The rod turns against the crank at -30 rad/s, so that the
+    slider moves. In 0.5 s the crank turns by 15 rad and is upright or hangs seven times more. The judge's
+    closed form, which has only the angle of the crank, is met to 100 rtol."""
     scene = upright_slider_crank(-30.0)
     run = simulate(scene, "taylor", np.linspace(0.0, 0.5, 21), Limits(rtol=1e-9))
     assert relative_error(run, scene) < 100 * RTOL and len(run.crossings) == 7
 
 
 def test_missing_velocities_choose_the_branch_of_the_least_kinetic_energy():
-    """Crank and rod turn as one body, their middles on a circle of 0.154 m, and the slider rests."""
+    """Crank and rod of equal length are upright. They turn as one body, their middles on a circle of 0.154 m,
+    and the slider rests, to rtol (m)."""
     times = np.linspace(0.0, 0.5, 21)
     run = simulate(upright_slider_crank(None), "taylor", times, Limits(rtol=1e-9))
     assert run.outcome.name == "COMPLETED" and "branch with the least kinetic energy" in run.message
@@ -58,7 +60,8 @@ def test_missing_velocities_choose_the_branch_of_the_least_kinetic_energy():
 
 
 def test_velocities_that_belong_to_no_branch_are_undecided():
-    """A rate of the rod of 9 rad/s satisfies Φ_q v = 0; the branches have -30 and 30 rad/s."""
+    """Crank and rod of equal length are upright; the crank turns at 30 rad/s. A rate of the rod of 9 rad/s
+    satisfies Φ_q v = 0; the branches have -30 and 30 rad/s."""
     run = simulate(upright_slider_crank(9.0), "taylor", [0.0, 0.1])
     assert run.outcome.name == "UNDECIDED" and "agree with none of the branches" in run.message
 
@@ -92,9 +95,10 @@ def test_slow_start_along_the_weight_falls_with_its_energy(rate):
 
 
 def test_slow_start_against_the_weight_is_undecided_at_its_singular_position():
-    """The weight stops the cranks at φ = ½ I ω² / 2 m g l = 1.5e-6 rad, from where they fall through the
-    singular position again. Rounding, 2⁻⁵², changes the direction of velocities by 2⁻⁵² / φ² = 1e-4 there,
-    and so would choose the branch. The run tries a tight rtol, and branch 2 at its crossing 1, in vain."""
+    """The cranks of 0.3 m start flat at 0.01 rad/s. The weight stops them at φ = ½ I ω² / 2 m g l = 1.5e-6
+    rad, from where they fall through the singular position again. Rounding, 2⁻⁵², changes the direction of
+    velocities by 2⁻⁵² / φ² = 1e-4 there, and so would choose the branch. The run tries a tight rtol, and
+    branch 2 at its crossing 1, in vain."""
     run = simulate(falling_parallelogram(0.01), "taylor", np.linspace(0.0, 1.0, 9))
     assert run.outcome.name == "UNDECIDED" and run.t_end == 0.0 and not run.times.size
     assert run.message.endswith(
@@ -124,7 +128,8 @@ def test_branches_of_a_start_at_rest_are_listed_without_velocities():
 
 
 def test_run_of_a_microsecond_from_a_singular_position_is_exact():
-    """Runs of 1 and 100 µs; the truth is the judge's closed form of crank and rod of equal length."""
+    """Crank and rod of equal length start upright. Runs of 1 and 100 µs have the judge's closed form, to
+    rounding."""
     scene = upright_slider_crank(-30.0)
     for end in (1e-6, 1e-4):
         times = np.linspace(0.0, end, 3)
@@ -134,9 +139,9 @@ def test_run_of_a_microsecond_from_a_singular_position_is_exact():
 
 @pytest.mark.parametrize("linkage", [four_bar, five_bar])
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_driven_loop_starts_up_to_1e_7_rad_from_flat_and_moves_as_its_closed_form(linkage, side):
-    """Distances of 1e-11 to 1.6e-7 rad on both sides. The driver, not rounding, decides the branch: no run is
-    undecided."""
+def test_driven_loop_that_starts_nearly_flat_moves_as_its_closed_form(linkage, side):
+    """Distances of 1e-11 to 1.6e-7 rad from flat, on both sides. The driver, not rounding, decides the
+    branch: no run is undecided, and the judge's closed form is met to rounding."""
     for distance in (1.6e-7, 1e-7, 4e-8, 1.6e-8, 6.3e-9, 1.6e-9, 1e-9, 4e-10, 1e-11):
         scene = linkage(math.pi + side * distance)
         run = simulate(scene, "taylor", np.linspace(0.0, 0.05, 6), Limits(rtol=1e-9))

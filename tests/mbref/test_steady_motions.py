@@ -35,8 +35,9 @@ def squares(each) -> np.ndarray:
 
 @pytest.mark.parametrize("rate", [3.0, 4.0, 4.8, 6.0, -6.0, 12.0])
 def test_a_pendulum_on_a_spindle_leaves_the_axis_above_the_critical_rate(rate):
-    """Steady angles are 0, π and, from Ω² = g / l on, acos(g / (l Ω²)) on both sides. Their eigenvalues are
-    I s² = -(m g l cos α - m l² Ω² cos 2α), I = OWN + m l²; s² < 0 is stable."""
+    """Steady angles are 0, π and, from Ω² = g / l on, acos(g / (l Ω²)) on both sides, to ACCURACY. Their
+    eigenvalues are I s² = -(m g l cos α - m l² Ω² cos 2α), I = OWN + m l²; s² < 0 is stable. Eigenvalues are
+    exact to rounding of sums of 1e3, 1e-11."""
     found = equilibria(turning_pendulum(rate))
     beside = G / (LENGTH * rate**2)
     expected = [0.0, np.pi] + ([np.arccos(beside), -np.arccos(beside)] if beside < 1 else [])
@@ -45,19 +46,19 @@ def test_a_pendulum_on_a_spindle_leaves_the_axis_above_the_critical_rate(rate):
         a = angle(each)
         bend = MASS * G * LENGTH * np.cos(a) - MASS * LENGTH**2 * rate**2 * np.cos(2 * a)
         exact = -bend / (OWN + MASS * LENGTH**2)
-        assert np.allclose(squares(each), exact, rtol=1e-11), (rate, a)  # rounding of sums of 1e3
+        assert np.allclose(squares(each), exact, rtol=1e-11), (rate, a)
         assert each.stability == ("stable" if exact < 0 else "unstable") and each.rate == abs(rate)
 
 
 def test_hinge_of_a_steady_motion_carries_weight_and_centripetal_force():
-    """At Ω = 6 rad/s and the radius r: m Ω² r towards the axis, and m g."""
+    """At Ω = 6 rad/s and the radius r: m Ω² r towards the axis, and m g, to ACCURACY."""
     [each] = [e for e in equilibria(turning_pendulum(6.0)) if e.stability == "stable" and angle(e) > 0]
     radius = each.scene.body[1].position[0]
     assert np.allclose(each.reactions["B"][:3], [-MASS * 36.0 * radius, 0.0, MASS * G], atol=ACCURACY)
 
 
 def test_scene_of_a_steady_motion_begins_with_its_velocities():
-    """Both bodies turn at Ω = 6 rad/s about z; the ball at the radius r moves at Ω r."""
+    """Both bodies turn at Ω = 6 rad/s about z; the ball at the radius r moves at Ω r, to ACCURACY."""
     [each] = [e for e in equilibria(turning_pendulum(6.0)) if e.stability == "stable" and angle(e) > 0]
     radius = each.scene.body[1].position[0]
     assert np.allclose(each.scene.body[1].velocity, [0.0, 6.0 * radius, 0.0], atol=ACCURACY)
@@ -116,7 +117,8 @@ BODIES = [*turning_pendulum(1.0).body, rod("free", (0.0, 0.0, 5.0), 1.0, 0.1)]
     [({"load": [PUSH]}, "loads"), ({"joint": JOINTS, "body": BODIES}, "joint 'C' does not turn with it")],
 )
 def test_motions_that_are_not_steady_are_refused_with_the_cause(change, says):
-    """A force on the ball has a direction fixed in space; a rod ties the ball to a point of the ground."""
+    """PUSH, a force on the ball, has a direction fixed in space; in JOINTS a rod ties the ball to a point of
+    the ground."""
     with pytest.raises(SceneError, match=rf"driver\[A\]: .*{says}.*, so the motion is not steady"):
         equilibria(turning_pendulum(6.0, **change), starts=2)
 

@@ -24,7 +24,7 @@ def test_newest_released_section_and_the_citation_are_of_the_version_of_the_pack
 
 
 def test_section_has_at_most_60_entries_of_one_line_without_timings():
-    """A line has at most 125 characters; times stand in docs/speed.md."""
+    """A line has at most 125 characters (LONGEST); times stand in docs/speed.md."""
     for section in SECTIONS:
         lines = entries(section)
         assert 0 < len(lines) <= MOST, f"{section[:6]} has {len(lines)} entries, at most {MOST} are allowed"

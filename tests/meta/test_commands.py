@@ -26,7 +26,8 @@ def test_pages_print_more_than_50_commands_of_both_programs():
 
 @pytest.mark.parametrize(("page", "words"), OF_PROGRAMS, ids=IDS)
 def test_command_that_a_page_prints_is_accepted_by_its_parser(page, words):
-    """The parser of mbref or crosscheck ends the program for an unknown word; ``> FILE`` is the shell's."""
+    """OF_PROGRAMS are the commands of README and docs. The parser of mbref or crosscheck ends the program for
+    an unknown word; ``> FILE`` is the shell's."""
     program, *arguments = words[: words.index(">")] if ">" in words else words
     assert PARSERS[program]().parse_args(arguments)
 

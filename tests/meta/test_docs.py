@@ -41,7 +41,8 @@ def test_contents_of_the_site_name_every_page_once():
 
 @pytest.mark.parametrize("name", METHODS)
 def test_page_of_a_method_has_equations_use_limits_and_measurements(name):
-    """A formula in $$, the paragraphs "Use it for" and "It fails on", and the section "Measured"."""
+    """METHODS are all formulations, stabilisations and integrators. A page has a formula in $$, the
+    paragraphs "Use it for" and "It fails on", and the section "Measured"."""
     text = MADE.get(f"methods/{name}.md") or (DOCS / "methods" / f"{name}.md").read_text()
     assert text.startswith(f"# `{name}`: ") and "$$" in text
     assert "**Use it for**: " in text and "**It fails on**: " in text and "## Measured" in text

@@ -97,7 +97,7 @@ def makes(name: str) -> bool:
 
 @pytest.mark.parametrize("package", FLOORS)
 def test_modules_do_not_import_each_other_in_a_circle(package):
-    """Imports inside functions and for types count, too."""
+    """In each package; imports inside functions and for types count, too."""
     assert not circle(graph(package))
 
 

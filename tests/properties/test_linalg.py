@@ -87,8 +87,9 @@ def penrose_ratios(d, inverse):
 @pytest.mark.parametrize("name", PSEUDO_INVERSES)
 @given(case=matrices(condition=1e12), noise=st.floats(0, 1e-15), seed=st.integers(0, 2**32 - 1))
 def test_pseudo_inverse_has_the_four_penrose_properties(name, case, noise, seed):
-    """Matrices of known rank and condition up to 1e12, exact or changed by rounding, up to 1e-15 an entry.
-    The rank is found with the tolerance 1e-13; residuals are below 30 ε n κ (``penrose_ratios``)."""
+    """PSEUDO_INVERSES are those of MPI-SVD and MPI-GS. Matrices have known rank and condition up to 1e12,
+    exact or changed by rounding, up to 1e-15 an entry. The rank is found with the tolerance 1e-13; residuals
+    are below RATIO, 30, times ε n κ (``penrose_ratios``)."""
     d, rank, _ = case
     changed = d + noise * np.random.default_rng(seed).normal(size=d.shape)
     inverse, found = PSEUDO_INVERSES[name](changed, 1e-13)

@@ -143,7 +143,8 @@ def test_paper_section_without_studies_lacks_only_their_headings(records, blocks
 
 
 def test_indexed_records_return_under_their_labels(records, tmp_path):
-    """A label is the table, row and column of the paper; the file has keys of runs alone."""
+    """A label is the table, row and column of the paper; the file of records has keys of runs alone.
+    ``index`` writes the key of each label, by which ``indexed`` finds the records again."""
     chosen = dict(list(runs.cases().items())[:5])
     for label, case in chosen.items():
         append(tmp_path / store.FILE, {**records[label], "key": key(case)})
