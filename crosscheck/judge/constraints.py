@@ -30,6 +30,7 @@ Residuals = dict[str, np.ndarray]
 
 KEPT = 64  # scenes whose initial velocities and length are kept: each run of a comparison asks for them
 HELD = 1e-14  # residual / largest sum of terms; a smaller residual is rounding
+MET = 1e-9  # distance / radius of gyration; bodies at a smaller distance have met up to errors of a motion
 COINCIDENT = 1e-14  # distance / largest coordinate; points at a smaller distance differ by rounding
 
 
@@ -227,15 +228,16 @@ def scene_length(scene: Scene) -> float:
     """Return the characteristic length (m): the largest distance between two joint anchors or centres of mass
     at t = 0.
 
-    If all these points coincide up to rounding, the length is the distance that a free body travels or a
-    radius of gyration, whichever is larger, and 1 if both vanish.
+    If all these points coincide up to the rounding of a motion, the length is the distance that a free body
+    travels or a radius of gyration, whichever is larger, and 1 if both vanish.
     """
     points = [body.position for body in scene.body]
     for joint in scene.joint:
         points += joint.anchor_pair
     array = np.array(points)
     length = float(np.linalg.norm(array[:, None] - array[None], axis=-1).max())
-    return length if length > COINCIDENT * np.abs(array).max() else _of_one_point(scene) or 1.0
+    rounding = max(COINCIDENT * np.abs(array).max(), MET * _radius_of_gyration(scene))
+    return length if length > rounding else _of_one_point(scene) or 1.0
 
 
 def _of_one_point(scene: Scene) -> float:
@@ -243,11 +245,16 @@ def _of_one_point(scene: Scene) -> float:
     is larger."""
     speeds = [np.linalg.norm(body.velocity or 0.0) for body in scene.body]
     way = max(speeds) * scene.duration + np.linalg.norm(scene.gravity) * scene.duration**2 / 2
+    return max(float(way), _radius_of_gyration(scene))
+
+
+def _radius_of_gyration(scene: Scene) -> float:
+    """Return the largest radius of gyration (m) of the bodies; 0 without masses."""
     if not scene.has_mass():
-        return float(way)
+        return 0.0
     masses = np.array([body.mass for body in scene.body], dtype=float)
     largest = np.linalg.eigvalsh(inertia_matrices(scene))[:, -1]
-    return float(np.sqrt(largest[masses > 0] / masses[masses > 0]).max(initial=way))
+    return float(np.sqrt(largest[masses > 0] / masses[masses > 0]).max(initial=0.0))
 
 
 def inertia_matrices(scene: Scene) -> np.ndarray:

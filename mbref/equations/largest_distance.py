@@ -1,4 +1,4 @@
-"""The largest distance between two points of a set, exact, without a table of all pairs.
+"""Characteristic lengths of scenes: largest distances between two points, exact, without tables of all pairs.
 
 A few points are compared in pairs. Many points are divided into about √n boxes of neighbours. The distance of
 the far corners of two boxes bounds the distances of their points, so that most pairs of boxes are never
@@ -12,8 +12,24 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from mbref.scene.fields import COINCIDENT
+
 FEW_POINTS = 32  # points; up to here all pairs of a set cost less than its division
+MET = 1e-9  # distance / radius of gyration; bodies at a smaller distance have met up to errors of a motion
 ROUNDING = 1e-14  # relative; larger than the rounding of a distance in three dimensions
+
+
+def characteristic_lengths(points: np.ndarray, mass: np.ndarray) -> np.ndarray:
+    """Return the lengths (s,), m, of scenes: the largest distance of their points (s, n, 3).
+
+    Where all points of a scene coincide up to the rounding of a motion, the length is the largest radius of
+    gyration by masses and moments of inertia (s, nb, 6), or 1 if no body has one.
+    """
+    distances, has_mass = largest_distances(points), mass[..., 0] > 0.0
+    squares = np.where(has_mass, mass[..., 3:].max(axis=-1), 0.0) / np.where(has_mass, mass[..., 0], 1.0)
+    radii = np.sqrt(squares.max(axis=1))
+    rounding = np.maximum(COINCIDENT * np.abs(points).max(axis=(1, 2)), MET * radii)
+    return np.where(distances > rounding, distances, np.where(radii > 0.0, radii, 1.0))
 
 
 def largest_distances(points: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ from mbref import rotations
 from mbref.equations.couplings import coordinate_primitives, couplings_of
 from mbref.equations.functions import functions_of, numbers_of, pieces_of
 from mbref.equations.joints import Primitive, rows_of_joint, vectors_of
-from mbref.equations.largest_distance import largest_distances
+from mbref.equations.largest_distance import characteristic_lengths
 from mbref.equations.load_numbers import (
     Values,
     anchors_of,
@@ -52,7 +52,6 @@ from mbref.scene import (
     Joint,
     Scene,
 )
-from mbref.scene.fields import COINCIDENT
 
 OF_MASS = np.array([7, 7, 7, 8, 9, 10])  # indices of a body's parameters on the diagonal of M
 
@@ -220,8 +219,8 @@ class Packs:
         anchors = self._rows(_once(anchors_of, joints), 6).reshape(len(self.scenes), -1, 3)
         nb, nj = len(self.scenes[0].body), len(self.scenes[0].joint)
         points = np.concatenate((self._centres[:, :nb], anchors[:, : 2 * nj]), axis=1)
-        self.length = largest_distances(points)
-        self.length = np.where(self.length > COINCIDENT * np.abs(points).max(axis=(1, 2)), self.length, 1.0)
+        mass = np.zeros_like(self.mass) if self.kinematic else self.mass
+        self.length = characteristic_lengths(points, mass.reshape(len(points), self.nb, 6))
         anchored = self.structure.anchored
         return body_lengths(anchors - self._centres[:, anchored], anchored, self.nb)
 

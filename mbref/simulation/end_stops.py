@@ -14,10 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from mbref.equations.impacts import Impact, impact, is_locked
+from mbref.equations.model import Model
 from mbref.motions.driving_forces import coordinate_acceleration
 from mbref.motions.joint_motion import along, joint_motion
 from mbref.motions.motion import Motion
-from mbref.motions.pieces import constraint_parts, in_contact
+from mbref.motions.pieces import constraint_parts, first_piece, in_contact
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Driver, Scene, SceneError
 from mbref.scene.joints import DISPLACEMENT, Coordinate
@@ -68,8 +69,9 @@ class EndStops:
     def __init__(self, scene: Scene, run: Callable[[Scene, np.ndarray], Motion], end: float):
         self.scene, self._run, self._end = scene, run, end
         self.sides = [*_sides(scene)]
-        points = np.array([body.position for body in scene.body] + [j.anchor_pair[0] for j in scene.joint])
-        self.length = float(np.ptp(points, axis=0).max(initial=0.0)) or 1.0
+        model = Model(first_piece(scene))
+        self.length = float(model.length)
+        model.release()
 
     def _least(self, side: Side) -> float:
         return GAP_CLOSED * (self.length if side.coordinate == DISPLACEMENT else 1.0)
@@ -121,13 +123,14 @@ class EndStops:
         hits = [side for side in touching if rates[side] < -still and side.name not in contacts]
         wanted = {side: -side.restitution * rates[side] for side in hits}
         found, chatter = self._impact(before, after, state, touching, wanted, still), list[Side]()
-        for side in hits:
-            if wanted[side] > still and self._flight(after, found, side, wanted[side]) < CHATTER * self._end:
-                chatter.append(side)
+        bouncing = [side for side in hits if wanted[side] > still]
+        if bouncing:
+            flying = self._in_lasting(after, found, self._resting(touching, state, found, still))
+            chatter = [s for s in bouncing if self._flight(flying, s, wanted[s]) < CHATTER * self._end]
         if chatter:
             wanted |= dict.fromkeys(chatter, 0.0)
             found = self._impact(before, after, state, touching, wanted, still)
-        resting = [s for s in touching if abs(self._rate(s, state, found)) <= still]
+        resting = self._resting(touching, state, found, still)
         lasting = self._lasting(with_impact(after, found), resting)
         names = [tuple(side.name for side in sides) for sides in (hits, lasting, chatter)]
         return StopsMet(found, *names)
@@ -155,9 +158,19 @@ class EndStops:
         moved = replace(state, velocity=found.velocity[None], angular_velocity=found.angular_velocity[None])
         return float(side.gap(self.scene, moved)[1][0])
 
-    def _flight(self, after: Scene, found: Impact, side: Side, rate: float) -> float:
-        """Return the time (s) until the gap closes again, at the acceleration after the impact."""
+    def _resting(
+        self, touching: Sequence[Side], state: Trajectory, found: Impact, still: float
+    ) -> list[Side]:
+        """Return the sides whose gaps neither open nor close after an impact."""
+        return [side for side in touching if abs(self._rate(side, state, found)) <= still]
+
+    def _in_lasting(self, after: Scene, found: Impact, resting: Sequence[Side]) -> Scene:
+        """Return the scene after an impact with the contacts that last, whose forces act on other flights."""
         piece = with_impact(after, found)
+        return in_contact(piece, [side.name for side in self._lasting(piece, resting)])
+
+    def _flight(self, piece: Scene, side: Side, rate: float) -> float:
+        """Return the time (s) until a gap closes again, at the acceleration at the start of a piece."""
         motion = self._run(piece, np.zeros(1))
         if not len(motion.times) or motion.acceleration is None:
             return np.inf

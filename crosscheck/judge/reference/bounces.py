@@ -155,17 +155,19 @@ class Bounces:
         touching = self._free(after, touching, before)
         wanted = hits(after, touching, before, contacts)
         found = bounced(after, before, touching, wanted).state
-        for end in [end for end, rate in wanted.items() if rate > 0]:
-            second = self._second(after, found, [end])[0]
-            if second < 0 and -2 * wanted[end] / second < CHATTER * self._end:
-                wanted[end] = 0.0
-        found = bounced(after, before, touching, wanted).state
-        slow = np.abs(rates_of(after, touching, found)) <= still(after, before)
-        resting = [end for end, rests in zip(touching, slow, strict=True) if rests]
+        flying = [end for end, rate in wanted.items() if rate > 0]
+        if flying:
+            there = _moving(after, found)
+            there = held(there, self._lasting(there, _resting(after, touching, found, before)))
+            for end, second in zip(flying, self._second(there, flying), strict=True):
+                if second < 0 and -2 * wanted[end] / second < CHATTER * self._end:
+                    wanted[end] = 0.0
+            found = bounced(after, before, touching, wanted).state
+        resting = _resting(after, touching, found, before)
         return found, self._lasting(_moving(after, found), resting)
 
-    def _second(self, piece: Scene, state: State, ends: Sequence[End]) -> np.ndarray:
-        motion = self._run(_moving(piece, state), np.zeros(1))
+    def _second(self, piece: Scene, ends: Sequence[End]) -> np.ndarray:
+        motion = self._run(piece, np.zeros(1))
         now = (doubles(getattr(motion, key)[0]) for key in FIELDS)
         place, turn, velocity, spin, acceleration, spin_rate = now
         return second_rates(piece, ends, State(place, turn, velocity, spin), acceleration, spin_rate)
@@ -182,6 +184,12 @@ class Bounces:
                 break
             del kept[int(pushes.argmin())]
         return tuple(end.name for end in kept)
+
+
+def _resting(piece: Scene, touching: Sequence[End], state: State, before: State) -> list[End]:
+    """Return the ends whose gaps neither open nor close in a state after an impact."""
+    slow = np.abs(rates_of(piece, touching, state)) <= still(piece, before)
+    return [end for end, rests in zip(touching, slow, strict=True) if rests]
 
 
 def _inverse(points: Sequence[tuple[float, float]]) -> float:

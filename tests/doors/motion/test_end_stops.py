@@ -1,9 +1,11 @@
 """End stops with restitution: closed forms, contacts, chatter, the judge's own events, refusals."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import mbref
 from crosscheck.engine import engine
@@ -69,15 +71,56 @@ def test_bounces_follow_each_other_in_a_geometric_series(method, close):
     assert shares == pytest.approx([e**2] * count, rel=100 * close)
 
 
-def test_bounces_without_end_become_a_contact_that_carries_the_weight():
-    """With e = 0.2 they end at t₀ (1 + e) / (1 - e) = 1.5 t₀. Flights below 1e-6 of the end time, 1 s, are
-    left out, some 1e-6 s together. The contact at -1 m carries 2 kg · 10 m/s²."""
-    motion = mbref.simulate(ball(0.2, 1.0), "taylor", times=[0.0, 0.9, 1.0])
+def ball_on_plate(restitution: float, duration: float) -> Scene:
+    """The ball falls onto a plate of 3 kg that rests on a stop of its own; all joints meet in one point."""
+    plate, stop = body("plate", 3.0, [0.1] * 3, ORIGIN), {"lower": -1.0, "restitution": restitution}
+    joints = [slide("P", "ground", "plate", ORIGIN, Z, stop={"lower": 0.0})]
+    joints += [slide("S", "plate", "ball", Z, Z, stop=stop)]
+    return ball(restitution, duration).with_(body=[plate, body("ball", 2.0, [0.1] * 3, Z)], joint=joints)
+
+
+@pytest.mark.parametrize(("scene", "below"), [(ball, 0.0), (ball_on_plate, 3.0)], ids=["ground", "plate"])
+def test_bounces_without_end_become_a_contact_that_carries_the_weight(scene, below):
+    """They end at t₀ (1 + e) / (1 - e), without the flights below 1e-6 of the end time. The lowest joint
+    carries the weight of the ball and of the mass ``below`` it (kg)."""
+    motion = mbref.simulate(scene(0.2, 1.0), "taylor", times=[0.0, 0.9, 1.0])
     last = motion.events[-1]
-    assert (last.stops, last.contacts, last.chatter) == (("S.lower",),) * 3 and "bounces end" in last.sentence
+    assert last.stops == last.chatter == ("S.lower",) and "bounces end" in last.sentence
     assert abs(last.time - 1.5 * np.sqrt(2 / G)) <= 1e-5  # s
-    assert np.abs(motion.position[1:, 0, 2] + 1.0).max() <= SOLVED
-    assert np.abs(motion.joint("S").force[1:, 2] - 2.0 * G).max() <= 10 * SOLVED
+    assert np.abs(motion.joint("S").displacement[1:] + 1.0).max() <= SOLVED
+    lowest = motion.joint(motion.mechanism.joint[0].name)
+    assert np.abs(lowest.force[1:, 2] - (2.0 + below) * G).max() <= 10 * SOLVED
+    assert "S.lower" in last.contacts
+
+
+def meetings(e: float, end: float) -> Iterator[float]:
+    """Yield the times (s) at which a ball that starts at rest at 0.3 m meets a table at b = 0.02 sin 30 t m.
+
+    Its flights are parabolas, whose roots with b are found by bisection, and it leaves with b' + e (b' - v).
+    """
+    place, speed, begin = 0.3, 0.0, 0.0
+
+    def gap(t):
+        return place + speed * (t - begin) - G / 2 * (t - begin) ** 2 - 0.02 * np.sin(30 * t)
+
+    while (gap(times := np.linspace(begin + 1e-6, end, 4001)) < 0.0).any():
+        k = int(np.argmax(gap(times) < 0.0))
+        time = brentq(gap, times[k - 1], times[k], xtol=1e-15)
+        rate, before = 0.6 * np.cos(30 * time), speed - G * (time - begin)
+        place, speed, begin = 0.02 * np.sin(30 * time), rate + e * (rate - before), time
+        yield time
+
+
+def test_ball_meets_a_vibrating_table_at_the_roots_of_its_flights():
+    """``meetings`` are the truth. Where the ball meets the table, all bodies and joints are in one point."""
+    place, stop = (0.0, 0.0, 0.3), {"lower": -0.3, "restitution": 0.7}
+    bodies = [body("table", 1.0, [0.1] * 3, ORIGIN), body("ball", 2.0, [0.1] * 3, place)]
+    joints = [slide("T", "ground", "table", ORIGIN, Z), slide("S", "table", "ball", place, Z, stop=stop)]
+    wave = {"joint": "T", "polynomial": [0.0], "sine": {"amplitude": 0.02, "frequency": 30.0}}
+    scene = Scene(name="table", gravity=(0.0, 0.0, -G), body=bodies, joint=joints, driver=[wave])
+    motion, exact = mbref.simulate(scene, "taylor", times=[0.0, 0.8]), [*meetings(0.7, 0.8)]
+    assert len(exact) == 2 and [event.stops for event in motion.events] == [("S.lower",)] * 2
+    assert np.abs(np.array([event.time for event in motion.events]) - exact).max() <= ROUNDED
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.6])
