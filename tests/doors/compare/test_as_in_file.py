@@ -112,7 +112,8 @@ def test_velocities_and_accelerations_of_the_files_model_are_differences_of_its_
 
 def test_stiff_closures_and_small_steps_together_reach_the_motion_of_exact_joints(tmp_path):
     """Errors of positions (m) after 0.05 s by Gauss's principle with exact joints: 8e-3 as in the file, 6e-4
-    with smaller steps, whose closures are soft, and 4e-10 with stiff closures and RK4 too (measured)."""
+    with smaller steps, whose closures are soft, and 4e-10 with stiff closures and RK4 too (measured). Both
+    limits have a wide margin, as other processors and versions of MuJoCo change these errors."""
     scene, times = imported(tmp_path, FOUR_BAR, TILTED), np.array([0.0, 0.05])
     true = gauss_motion(scene, tuple(times.tolist())).position
     off = {
@@ -194,11 +195,8 @@ def test_verdict_on_a_files_own_settings_states_an_angle_in_rad_and_no_lever(tmp
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
-        ({"metrics": {"error": 1e-9, "position_error": 1e-9, "rotation_error": 1e-9}}, "is right:"),
-        (
-            {"outcome": "NOT_FINITE", "t_end": 0.2, "message": "the state became NaN"},
-            "is not finite at 0.2 s: the state became NaN",
-        ),
+        ({"metrics": dict.fromkeys(("error", "position_error", "rotation_error"), 1e-9)}, "is right:"),
+        ({"outcome": "NOT_FINITE", "t_end": 0.2, "message": "a NaN"}, "is not finite at 0.2 s: a NaN"),
         ({"metrics": {"error": None}}, "has no known error: its closures open by up to 1.2 mm."),
     ],
     ids=["right", "failed", "no truth"],
@@ -239,24 +237,23 @@ def test_mujocos_model_of_a_file_with_a_held_base_begins_at_the_pose_of_the_scen
 
 
 def test_hold_refuses_a_body_that_hangs_on_another_body(tmp_path):
+    """The leg hangs on the trunk, which alone has a joint to the ground."""
     with pytest.raises(RequestError, match="--hold leg: is not a body that a joint connects to the ground"):
         imported(tmp_path, DOG, ImportOptions(hold=["leg"]))
 
 
-@pytest.mark.parametrize("name", ["heavy_top", "point_pendulum"])
-def test_a_body_on_a_joint_to_the_ground_does_not_fall_freely(name):
-    assert not falls_freely(SCENES[name]())
-
-
-def test_a_free_body_falls_freely_only_with_gravity_and_without_spin():
-    """Its motion is g t² / 2 then; a spin adds Euler's equations, and without gravity nothing falls."""
-    still = SCENES["heavy_top"]().with_(joint=()).with_("body[0].angular_velocity", (0.0, 0.0, 0.0))
-    assert falls_freely(still)
+def test_a_body_falls_freely_only_without_joints_and_spin_and_with_gravity():
+    """Its motion is g t² / 2 then. A joint to the ground holds it, a spin adds Euler's equations, and without
+    gravity nothing falls."""
+    top = SCENES["heavy_top"]()
+    still = top.with_(joint=()).with_("body[0].angular_velocity", (0.0, 0.0, 0.0))
+    assert falls_freely(still) and not falls_freely(still.with_(joint=top.joint))
     assert not falls_freely(still.with_("body[0].angular_velocity", (1.0, 2.0, 3.0)))
     assert not falls_freely(still.with_(gravity=(0.0, 0.0, 0.0)))
 
 
 def test_hold_adds_a_fixed_joint_between_a_body_and_the_ground():
+    """The other joints of the built-in four-bar stay."""
     scene = SCENES["four_bar_gravity"]()
     name = scene.body[0].name
     *others, joint = held(scene, [name]).joint
@@ -270,6 +267,7 @@ def test_hold_refuses_an_unknown_body_of_a_scene():
 
 
 def test_reading_a_file_reports_parts_left_out_and_closed_loops(tmp_path):
+    """The keyframe has joint A at 0.5 rad, beyond its limit of 0.01 rad, and leaves the loop open at C."""
     said: list[str] = []
     path = tmp_path / "robot.xml"
     path.write_text(FOUR_BAR)

@@ -20,28 +20,22 @@ def end_of(scene: Scene, end: float | None = None) -> float | None:
     return dead_position(scene, Pose(*initial_poses(scene)), 0.0, end or scene.duration)
 
 
-@pytest.mark.parametrize(  # crank, rod (units of the size, m), start angle of the crank (rad), speed
-    ("scene", "time"),
-    [
-        pushed(0.2, 0.5, 1.0, 0.7, 1.0),
-        pushed(0.4, 0.3, 0.5, 0.7, 1e-3),
-        pushed(0.1, 1.0, -1.4, 0.7, 1e3),
-        turned(0.5, 0.4, 0.3, 4.0),
-    ],
-    ids=["pushed", "pushed, 1 mm", "pushed, 1 km", "turned"],
-)
+# crank, rod (units of the size), start angle of the crank (rad), speed, size (m); and the closed form's time
+MADE = {"pushed": pushed(0.2, 0.5, 1.0, 0.7, 1.0), "turned": turned(0.5, 0.4, 0.3, 4.0)}
+SIZED = {"pushed, 1 mm": pushed(0.4, 0.3, 0.5, 0.7, 1e-3), "pushed, 1 km": pushed(0.1, 1.0, -1.4, 0.7, 1e3)}
+
+
+@pytest.mark.parametrize(("scene", "time"), [*MADE.values(), *SIZED.values()], ids=[*MADE, *SIZED])
 def test_reference_ends_at_the_dead_position_of_a_driven_slider_crank(scene, time):
     """Closed forms: a pushed slider cannot go farther than crank + rod from the shaft; a crank that is longer
     than its rod cannot turn on when the rod stands upright."""
     assert end_of(scene) == pytest.approx(time, rel=ACCURACY)
 
 
-@pytest.mark.parametrize(
-    "made", [lambda: turned(0.5, 0.4, 0.3, 4.0), lambda: pushed(0.2, 0.5, 1.0, 0.7)], ids=["turned", "pushed"]
-)
-def test_motion_that_ends_before_its_dead_position_has_none(made):
+@pytest.mark.parametrize("name", MADE)
+def test_motion_that_ends_before_its_dead_position_has_none(name):
     """It ends at 0.95 of the closed form's time."""
-    scene, time = made()
+    scene, time = MADE[name]
     assert end_of(scene, 0.95 * time) is None
 
 
@@ -52,27 +46,21 @@ def test_singular_positions_of_a_driven_four_bar_are_no_dead_positions():
     assert end_of(SCENES["four_bar"](), 1.05 * turn) is None
 
 
-@pytest.mark.parametrize(  # each a reference of 2 CPU s
-    "made",
-    [
-        pytest.param(lambda: turned(0.5, 0.4, 0.3, 4.0), marks=pytest.mark.slow),
-        lambda: pushed(0.2, 0.5, 1.0, 0.7),
-    ],
-    ids=["turned", "pushed"],
-)
-def test_comparison_with_even_samples_is_shortened_to_end_just_before_the_dead_position(made):
+# each a reference of 2 CPU s
+@pytest.mark.parametrize("name", [pytest.param("turned", marks=pytest.mark.slow), "pushed"])
+def test_comparison_with_even_samples_is_shortened_to_end_just_before_the_dead_position(name):
     """It keeps its 41 even samples, over at least 0.95 of the closed form's time."""
-    scene, time = made()
+    scene, time = MADE[name]
     shorter = followed(scene, np.linspace(0.0, scene.duration, 41), SECONDS)
     assert shorter.dead == pytest.approx(time, rel=ACCURACY)
     assert 0.95 * time < shorter.scene.duration == shorter.times[-1] < time and len(shorter.times) == 41
 
 
 @pytest.mark.slow
-def test_comparison_with_uneven_samples_keeps_the_samples_before_the_dead_position():
+def test_comparison_with_uneven_samples_keeps_the_samples_before_the_dead_position_if_any():
     """If no sample is before it, the comparison ends at the requested samples and reports no dead
     position."""
-    scene, time = pushed(0.2, 0.5, 1.0, 0.7)
+    scene, time = MADE["pushed"]
     uneven = followed(scene, np.array([0.1 * time, 0.5 * time, 2.0 * time]), SECONDS)
     assert np.array_equal(uneven.times, [0.1 * time, 0.5 * time])
     late = np.array([2.0 * time, 3.0 * time])
@@ -82,7 +70,7 @@ def test_comparison_with_uneven_samples_keeps_the_samples_before_the_dead_positi
 @pytest.mark.slow  # runs of an engine and a reference: 5 CPU s
 def test_engine_is_judged_up_to_the_dead_position_and_the_verdict_states_its_time():
     """OndselSolver is right up to there. The closed form gives the time."""
-    scene, time = pushed(0.2, 0.5, 1.0, 0.7)
+    scene, time = MADE["pushed"]
     found = crosscheck.compare(scene, "ondsel", reference_time=SECONDS)
     assert found.difference is None and found.judged.differences == {}
     assert "right at its best settings" in found.verdict.headline, found.verdict

@@ -19,13 +19,14 @@ def run(x: float, value: float | None, outcome: str = "COMPLETED") -> dict:
 
 @pytest.mark.parametrize("power", [-2.0, -0.5, 0.0, 1.0, 3.0])
 def test_power_of_a_law_is_found_whatever_its_sign(power: float) -> None:
-    """The value shown is of the finest step, here 1 ms, at which it is 2e-3."""
+    """Errors are 2e-3 (h / 1 ms)ᵖ at five steps h. The cell shows the one of the finest step, 1 ms, and p."""
     line = [run(x, 2e-3 * (x / 1e-3) ** power) for x in np.geomspace(0.1, 1e-3, 5)]
     assert cell(line, STEPS) == f"2e-03 ({power:.1f})"
 
 
 def test_cell_names_rounding_failures_and_refusals() -> None:
-    """Two values have no law. Signs: ! no run completes, – refused, ○ no record."""
+    """Two values have no law, and values below 1e-12 are rounding. Signs of the table: ! no run completes,
+    – refused, ○ no record."""
     assert cell([run(0.1, 3e-3), run(0.01, 2e-3)], STEPS) == "2e-03"
     assert cell([run(0.1, 1e-9), run(0.01, 1e-14), run(0.001, None, "TIMED_OUT")], STEPS) == "<1e-12"
     assert cell([run(0.1, None, "NOT_FINITE")], STEPS) == "!"
@@ -34,8 +35,8 @@ def test_cell_names_rounding_failures_and_refusals() -> None:
 
 @pytest.mark.parametrize(("step", "status"), [(euler, suite.FAIL), (symplectic_euler, suite.PASS)])
 def test_explicit_euler_feeds_energy_into_a_tumbling_body_and_symplectic_euler_does_not(step, status):
-    """Both are of order 1, with energy errors of equal size and opposite sign. Check passive allows no
-    gain."""
+    """Both are of order 1, with energy errors of equal size and opposite sign; the suite's check passive
+    allows no gain. The engine has settings of 10 and 20 steps over the duration."""
     body = next(each.scene for each in specimens() if each.scene.name == "tumbling body")
     bench = trial.set_up(InProcess(low_order(step, parts=(10, 20))), Specimen(body, keeps="energy"))
     assert suite.verdict_on("passive", bench).status == status

@@ -42,14 +42,10 @@ def failed(engine: str, family: str, t_end: float = 0.0) -> dict[str, Any]:
 
 
 RECORDS = (
-    record("mbref", "own", 5e-12, 0.001),
-    record("mujoco", "tuned", 4e-9, 0.5),
-    record("mujoco", "defaults", 2.8),
-    failed("pinocchio", "defaults"),
-    failed("exudyn", "defaults"),
-    record("pinocchio", "tuned", 6.04e-9, 0.032),
-    record("exudyn", "tuned", 1.7e-4, 0.2),
-)
+    record("mbref", "own", 5e-12, 0.001), record("mujoco", "tuned", 4e-9, 0.5),
+    record("mujoco", "defaults", 2.8), failed("pinocchio", "defaults"), failed("exudyn", "defaults"),
+    record("pinocchio", "tuned", 6.04e-9, 0.032), record("exudyn", "tuned", 1.7e-4, 0.2),
+)  # fmt: skip
 
 
 def group(records=RECORDS, scene=REDUNDANT, **known: Any) -> Judged:
@@ -122,15 +118,16 @@ SITUATIONS = {
 
 
 @pytest.mark.parametrize("situation", SITUATIONS)
-def test_verdict_in_sentences(situation, snapshot):
-    """The snapshot has the sentences for the records of SITUATIONS, which state errors and times of these."""
+def test_verdict_of_a_situation_has_the_sentences_of_the_snapshot(situation, snapshot):
+    """The snapshot has the sentences for the records of SITUATIONS, whose errors and times they state."""
     groups = SITUATIONS[situation]
     said = {"headline": headline(groups), "right": right(groups), "fast": fast(groups)}
     assert {**said, "breaks": breaks(groups), "truth": truth(groups)} == snapshot
 
 
 def test_defaults_without_a_truth_are_not_judged(snapshot):
-    """Two engines' defaults complete a motion whose truth is unknown; the snapshot has the sentences."""
+    """Two engines' defaults complete a motion whose truth is unknown, since it starts in a singular position;
+    the snapshot has the sentences, which say so."""
     unjudged = [record(name, "defaults", None, times=[0.0]) for name in ("mujoco", "exudyn")]
     assert breaks([group(unjudged, **UNKNOWN)]) == snapshot
 
@@ -175,7 +172,8 @@ def test_reading_records_does_not_change_a_file_with_a_cut_line(tmp_path):
 
 
 def test_runs_that_only_one_set_has_are_counted_or_listed(tmp_path):
-    """Two runs of engine b are in the old set only: one line counts them, and --all lists each."""
+    """Two runs of engine b are in the old set only: one line counts them, and --all (``is_all``) lists each
+    under the scene's name. The run of engine a is in both sets, unchanged."""
     both, gone = record("a", "x", 1e-5, 0.1), [record("b", family, 1e-5, 0.1) for family in "pq"]
     folders = [saved(tmp_path / name, runs) for name, runs in (("old", [both, *gone]), ("new", [both]))]
     said = []
@@ -196,9 +194,9 @@ def test_errors_below_the_truth_s_bound_are_drawn_at_the_bound():
     assert "1e-14" in drawn and "1e-16" not in drawn, drawn
 
 
-def test_tables_of_eighty_columns_cut_no_number():
-    """Each number stands whole in the tables of comparison and of runs. An end time of -1e-8 s is rounding,
-    and printed in neither; nor is a time of zero for a run that failed at its start."""
+def test_tables_of_eighty_columns_print_numbers_whole_and_no_end_time_that_is_rounding():
+    """Each number stands whole in both tables, of comparison and of runs. The end time -1e-8 s of a run that
+    failed at its start is rounding, and is not printed, nor is a zero in its place."""
     errors = {"error": 2.71e-5, "error_bound": 1e-14, "energy_error": 2.5e-12}
     own = partial(record, "pinocchio", "defaults", None, metrics={**errors, "violation_position": 1.13e-13})
     long = [

@@ -30,7 +30,8 @@ def test_planted_spring_is_found_from_a_noisy_angle_to_its_standard_errors():
 
 
 def test_command_names_the_combination_that_an_angle_does_not_determine(tmp_path, capsys):
-    """A pendulum's angle depends on the ratio of inertia and mass: equal relative changes do not count."""
+    """A pendulum's angle depends on the ratio of inertia and mass: equal relative changes, the direction
+    (1, 1)/√2 = 0.707 (1, 1) of either sign, have no effect, and both standard errors are infinite."""
     pendulum().save(tmp_path / "scene.toml")
     mbref.simulate(pendulum(), times=[0.2, 0.4, 0.6]).to_csv(tmp_path / "run.csv")
     free = ["--of", "A.angle", "--free", "body[bob].mass", "--free", "body[bob].inertia[2]"]
@@ -41,7 +42,9 @@ def test_command_names_the_combination_that_an_angle_does_not_determine(tmp_path
 
 
 def test_constant_column_counts_no_more_than_others():
-    """The standard deviation of equal numbers is rounding, such as 1e-17."""
+    """The angle has the mass 1.3 kg, and is fitted from 1.5 kg. A position across the plane, 0.1 m instead of
+    0, is constant, so that its standard deviation, a weight, is rounding. Noise-free fits are exact to
+    1e-6."""
     times, wrong = np.array([0.1, 0.2, 0.3]), pendulum().with_("body[bob].mass", 1.5)
     columns = mbref.simulate(pendulum(), times=times).columns("A.angle")
     found = mbref.fit(wrong, {**columns, "bob.position.z": np.full(3, 0.1)}, ["body[bob].mass"])

@@ -149,7 +149,8 @@ def test_derivative_of_a_conserved_energy_stays_the_one_at_the_start():
 
 
 def test_equilibrium_of_a_pendulum_with_a_torsion_spring_moves_as_in_closed_form():
-    """k φ = m g l cos φ with k = 10 N m/rad, m = 1.3 kg, l = 0.5 m: dφ/dk = -φ/(k + m g l sin φ)."""
+    """k φ = m g l cos φ with k = 10 N m/rad, m = 1.3 kg, l = 0.5 m: dφ/dk = -φ/(k + m g l sin φ), and so for
+    the gravity -g. Gravity m g_y is all that the hinge's force balances: its derivative is -m."""
     bob = body("bob", 1.3, [0.05, 0.06, 0.07], (0.5, 0.0, 0.0))
     spring = {"type": "torsion_spring", "joint": "A", "stiffness": 10.0}
     rest = mbref.equilibria(pendulum().with_(body=[bob], load=[spring]), starts=1)[0].scene
@@ -162,6 +163,7 @@ def test_equilibrium_of_a_pendulum_with_a_torsion_spring_moves_as_in_closed_form
 
 
 def test_driven_linkage_that_accelerates_from_rest_is_not_in_equilibrium():
+    """Its driver turns the crank by t² rad: velocities are zero at the start, and accelerations are not."""
     scene = crank_linkage(ROCKER).with_(driver=[{"joint": "A", "polynomial": [0.0, 0.0, 1.0]}])
     with pytest.raises(mbref.InputError, match="is not in equilibrium"):
         mbref.equilibrium_sensitivities(scene, ["B.force"], ["body[last].mass"])
@@ -216,7 +218,8 @@ def test_output_or_number_without_a_derivative_is_refused_by_name(scene, of, to,
 
 
 def test_derivatives_end_undecided_at_a_singular_position():
-    """The parallelogram swings through its flat position, where another branch begins."""
+    """The parallelogram falls through its flat position between 0.05 s and 0.3 s; another branch begins
+    there, so that a derivative depends on the branch."""
     found = mbref.sensitivities("four_bar_gravity", ["A.angle"], ["gravity.y"], [0.05, 0.3])
     assert found.outcome is mbref.Outcome.UNDECIDED
     assert np.isfinite(found.values[0]).all()
