@@ -2,8 +2,9 @@
 
     python benchmarks/sensitivities.py
 
-prints for each scene the CPU time of `mbref.sensitivities` of one output to the masses of all bodies and the
-components of gravity, as a ratio to one run at an equal tolerance.
+prints for each scene the CPU time of one run, and that of `mbref.sensitivities` of one output to
+1 and to 10 numbers as multiples of it, with the largest estimated error of a
+derivative over its largest value.
 """
 
 import time
@@ -14,14 +15,20 @@ import numpy as np
 
 import mbref
 from mbref import Limits
+from mbref.scene import Scene
 
-SCENES = {
-    "heavy_top": "energy",
-    "planar_slider_crank_gravity": "slider.position.x",
-    "spatial_slider_crank_gravity": "slider.position.x",
-    "sarrus": "energy",
+SCENES = {  # output, and end of the motion (s), before the first singular position
+    "four_bar_gravity": ("A.angle", 0.1),
+    "planar_slider_crank_gravity": ("slider.position.x", None),
+    "spatial_slider_crank_gravity": ("slider.position.y", None),
+    "four_bar_chain[5]": ("energy", 0.1),
+    "flyball_governor": ("energy", 1.0),
+    "sarrus": ("energy", None),
 }
 REPEATS = 5
+ROUNDING = (
+    1e-9  # derivative / largest one, in SI units, below which it is rounding, as by gravity across a plane
+)
 LIMITS = Limits(rtol=1e-12)
 
 
@@ -32,22 +39,39 @@ def seconds(call: Callable[[], object]) -> float:
     return time.process_time() - began
 
 
+def numbers_of(scene: Scene) -> list[str]:
+    """Return ten numbers of a scene: masses, gravity and anchors."""
+    masses = [f"body[{body.name}].mass" for body in scene.body]
+    gravity = [f"gravity.{axis}" for axis in "xyz"]
+    anchors = [f"joint[{joint.name}].anchor.{axis}" for joint in scene.joint[1:] for axis in "xyz"]
+    return [*masses[:4], *gravity, *anchors][:10]
+
+
 def main() -> None:
     """Print one line for each scene."""
-    for name, output in SCENES.items():
+    for name, (output, end) in SCENES.items():
         scene = mbref.find_scene(name)
-        numbers = [f"body[{body.name}].mass" for body in scene.body] + [f"gravity.{axis}" for axis in "xyz"]
-        times = np.linspace(0.0, scene.duration, 11)
+        numbers, times = numbers_of(scene), np.linspace(0.0, end or scene.duration, 11)
 
-        def run(scene=scene, times=times) -> object:
-            return mbref.simulate(scene, times=times, limits=LIMITS).columns("energy")
+        def run(scene=scene, times=times, output=output) -> object:
+            return mbref.simulate(scene, times=times, limits=LIMITS).columns(output)
 
-        def derivatives(scene=scene, times=times, output=output, numbers=numbers) -> object:
+        def one(scene=scene, times=times, output=output, numbers=numbers) -> object:
+            return mbref.sensitivities(scene, [output], numbers[:1], times, LIMITS)
+
+        def ten(scene=scene, times=times, output=output, numbers=numbers) -> object:
             return mbref.sensitivities(scene, [output], numbers, times, LIMITS)
 
-        pairs = [(seconds(run), seconds(derivatives)) for _ in range(REPEATS + 1)][1:]
-        ratio = median(own / one for one, own in pairs)
-        print(f"{name}: {len(numbers)} numbers, {ratio:.0f} runs, {ratio / len(numbers):.1f} runs a number")
+        found = mbref.sensitivities(scene, [output], numbers, times, LIMITS)
+        largest = np.abs(found.values).max(axis=(0, 1))
+        error = (found.errors.max(axis=(0, 1)) / largest)[largest > ROUNDING * largest.max()].max()
+        times_of = [(seconds(run), seconds(one), seconds(ten)) for _ in range(REPEATS + 1)][1:]
+        ratios = [median(each[k] / each[0] for each in times_of) for k in (1, 2)]
+        print(
+            f"{name}: {1e3 * median(each[0] for each in times_of):.1f} ms a run; "
+            f"1 number {ratios[0]:.0f} runs, {len(numbers)} numbers {ratios[1]:.0f} runs, error {error:.0e}",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

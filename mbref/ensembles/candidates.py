@@ -98,20 +98,30 @@ class Evaluations:
         self._model, self._packs = model, packs
         self._parameters = Parameters(parameters_of(model.memory.values, packs.data, packs))
 
-    def terms(self, places: np.ndarray, times: np.ndarray, q: np.ndarray, v: np.ndarray) -> Terms:
+    def terms(
+        self,
+        places: np.ndarray,
+        times: np.ndarray,
+        q: np.ndarray,
+        v: np.ndarray,
+        angles: np.ndarray | None = None,
+    ) -> Terms:
         """Return the terms of c scenes, given by index, at k states each; blocks have the shape (c, k, m,
         12): m rows, columns of two bodies.
 
-        Arguments are times (c, k), coordinates (c, k, 7 nb) and velocities (c, k, 6 nb).
+        Arguments are times (c, k), coordinates (c, k, 7 nb) and velocities (c, k, 6 nb); angles of turning
+        joints are nearest to ``angles`` (c, k, a), by default within half a turn.
         """
         m, n, memory, shape = self._model.m, self._model.n, self._model.memory, times.shape
-        columns = self._model.entry_columns
+        columns, reference = self._model.entry_columns, memory.values.angles
         blocks, rows, forces = (np.empty((*shape, size)) for size in (columns.size, 3 * m, n))
-        near_zero = np.zeros((0, memory.values.angles.size))
+        before = reference.copy()
+        near = np.zeros((len(places), 0, before.size)) if angles is None else angles
         for k, place in enumerate(places.tolist()):
             self._parameters.write(place)
             found = blocks[k], rows[k], forces[k]
-            evaluate_along(times[k], q[k], v[k], near_zero, *found, memory.packed.argument)
+            evaluate_along(times[k], q[k], v[k], near[k], *found, memory.packed.argument)
+        reference[:] = before
         self._model.put_numbers(memory.values, self._model.data)
         blocks = blocks.reshape(*shape, *columns.shape)
         phi, nu, gamma = np.split(rows, 3, axis=-1)

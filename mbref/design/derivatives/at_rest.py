@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mbref.design.derivatives.columns import Columns, differentiable
+from mbref.design.derivatives.columns import Columns
 from mbref.design.derivatives.panels import Precision
 from mbref.design.derivatives.result import Sensitivities
 from mbref.design.derivatives.sensitivities import (
@@ -21,7 +21,7 @@ from mbref.design.derivatives.start_numbers import is_of_start
 from mbref.design.derivatives.states import Direction, States
 from mbref.design.derivatives.tangents import (
     TangentRows,
-    independent_displacements,
+    partition_of,
     tangents_at,
     with_accelerations,
 )
@@ -78,35 +78,35 @@ def equilibrium_sensitivities(
         raise InputError(f"{scene.name}: {motion.message}")
     request.motion = motion
     first, second = (_solved(request, motion, each) for each in (FIRST_PRECISION, SECOND_PRECISION))
-    request.release()
+    request.model.release()
     return compared(first, second, request)
 
 
 def _solved(request: DerivativeRequest, motion: Motion, precision: Precision) -> Derivatives:
     """Return the derivatives (1, outputs, numbers) at the equilibrium, and the rounding of differences."""
     model, step = request.model, precision.step
-    numbers = request.differentiate(step)
+    numbers = request.numbers
     start = consistent_start(model)
     if start.v.any():
         raise InputError(f"{request.scene.name}: is not at rest; {FIND_EQUILIBRIUM}")
     none = np.zeros((1, model.n)), np.zeros((1, model.m))
     angles = np.zeros((1, len(model.structure.places.turning)))
     state = States(np.zeros(1), start.q[None], none[0], angles, *none)
-    rows = TangentRows(model, state)
-    driven = np.abs(rows.least(rows.terms.gamma)).max(initial=0.0) * request.scene.duration**2
+    rows = TangentRows(model, state, partition_of(model, state))
+    driven = np.abs(rows.placed(rows.terms.gamma[..., None])).max(initial=0.0) * request.scene.duration**2
     if driven > AT_BALANCE:  # displacement in the scene's duration
         raise InputError(f"{request.scene.name}: is not in equilibrium; a driver accelerates it")
-    state = with_accelerations(model, state, rows)
-    chosen = independent_displacements(rows.free[0])[None]
-    found, f = tangents_at(model, state, rows, chosen, numbers, step), rows.free.shape[2]
-    rates = np.concatenate([found.a[0], state.a.T], axis=1)[chosen[0]]  # a by (u, u', numbers), and a itself
+    state = with_accelerations(state, rows)
+    found, f = tangents_at(model, state, rows, numbers, step), rows.basis.shape[2]
+    # a by (u, u', numbers), and a itself
+    rates = np.concatenate([found.a[0], state.a.T], axis=1)[rows.partition.independent]
     stiffness = np.linalg.svd(rates[:, :f], compute_uv=False)
     if stiffness.min(initial=np.inf) <= NEUTRAL * stiffness.max(initial=0.0):
         raise InputError(f"{request.scene.name}: a neutral equilibrium does not determine its pose")
     moved = -np.linalg.solve(rates[:, :f], rates[:, 2 * f :])
     if np.abs(found.x[0][:, :f] @ moved[:, -1]).max(initial=0.0) > AT_BALANCE:
         raise InputError(f"{request.scene.name}: is not in equilibrium; {FIND_EQUILIBRIUM}")
-    columns, pairs = Columns(motion, differentiable(motion, request.of), step), []
+    columns, pairs = Columns(motion, request.outputs, step), []
     for k, number in enumerate(numbers):
         x, multipliers = (
             each[..., :f] @ moved[:, k] + each[..., 2 * f + k] for each in (found.x, found.multipliers)

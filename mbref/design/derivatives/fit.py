@@ -132,8 +132,8 @@ def fit(
 
     scene, columns = find_scene(scene), _columns(measured)
     refuse_repeats(scene, "free", free)
-    times = _finite({"time": columns.pop("time")})["time"]
-    motion = simulate(scene, times=checked_times(times))
+    times = checked_times(_finite({"time": columns.pop("time")})["time"])
+    motion = simulate(scene, times=times[:1])
     left_out = without_derivative(motion, [*columns]) if of is None else {}
     used = [name for name in columns if name not in left_out] if of is None else chosen(columns, of)
     if used != (whole := chosen(motion.columns(), used)):

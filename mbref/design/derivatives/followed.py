@@ -8,7 +8,13 @@ import numpy as np
 
 from mbref.design.derivatives.panels import Gauss, tails
 from mbref.design.derivatives.states import States
-from mbref.design.derivatives.tangents import TangentRows, independent_displacements
+from mbref.design.derivatives.tangents import (
+    MOST_ENTRIES,
+    Partition,
+    TangentRows,
+    partition_of,
+    ranks_at,
+)
 from mbref.equations.model import Model
 from mbref.input_error import InputError
 from mbref.method import Method
@@ -22,7 +28,8 @@ RESOLVED = 1e-10
 RESOLVED_BASIS = 1e-8  # the same of displacements by the independent ones
 STEPS_OF_PANEL = 4  # steps of the run for each of the first panels, of which those too long are bisected
 MOST_PANELS = 20_000  # a limit of memory and time
-WEAK = 0.1  # smallest singular value of the chosen rows of a basis, below which a panel is bisected
+# largest norm of a basis / √f, and of an inverse / that where its partition was chosen
+LARGEST_BASIS, LARGEST_INVERSE = 10.0, 10.0
 
 
 @dataclass(frozen=True)
@@ -31,7 +38,7 @@ class Followed:
 
     ``first`` (1,) is the state at t = 0, ``states`` (k,) are at the samples before that time. ``edges``
     (panels + 1,) are times, ``points`` and ``ends`` the states at Gauss points (panels N,) and ends (panels,)
-    of the panels, ``chosen`` (panels, f) the independent displacements.
+    of the panels. ``by_panel`` (panels,) and ``by_sample`` (k,) are indices of ``partitions``.
     """
 
     motion: Motion
@@ -42,42 +49,79 @@ class Followed:
     edges: np.ndarray
     points: States
     ends: States
-    chosen: np.ndarray
+    partitions: list[Partition]
+    by_panel: np.ndarray
+    by_sample: np.ndarray
 
     @staticmethod
     def of(
-        scene: Scene, model: Model, method: Method, limits: Limits, samples: np.ndarray, rule: Gauss
+        scene: Scene,
+        model: Model,
+        method: Method,
+        limits: Limits,
+        samples: np.ndarray,
+        rule: Gauss,
+        before: Followed | None = None,
     ) -> Followed:
         """Return the run of a scene by a method with its states at samples (k,), s, and in panels.
 
-        Raises InputError if the scene has no state at t = 0, or if panels stay too coarse.
+        The first panels are those of a run ``before``. Raises InputError if the scene has no state at t = 0,
+        or if panels stay too coarse.
         """
-        motion, states = _run(scene, method, limits, np.union1d(samples, 0.0))
+        edges = before.edges if before else np.zeros(1)
+        motion, states = _run(scene, method, limits, _all_times(edges, rule, samples))
         if not states.times.size:
             raise InputError(f"{scene.name}: {motion.message}")
         undecided = min((crossing.time for crossing in motion.crossings or ()), default=np.inf)
-        if len(set(TangentRows(model, states.at([0, -1])).ranks)) > 1:
+        ranks = ranks_at(model, states.at([0, -1]))
+        if ranks[0] != ranks[1]:
             undecided = 0.0  # the motion starts at a singular position
         reached = samples[(samples < undecided) & (samples <= states.times[-1])]
-        last = float(reached.max(initial=0.0))
-        freedoms = model.n - TangentRows(model, states.at(slice(0, 1))).rank
-        edges = _first_edges(model, last, motion.cost.steps) if freedoms else np.zeros(1)
-        rough = np.ones(len(edges) - 1, dtype=bool)
+        last, freedoms = float(reached.max(initial=0.0)), model.n - ranks[0]
+        if edges[-1] != last:
+            edges = _first_edges(model, last, motion.cost.steps) if freedoms else np.zeros(1)
         while len(edges) <= MOST_PANELS:
-            points = (edges[:-1, None] + np.diff(edges)[:, None] * rule.points).ravel()
-            _, states = _run(scene, method, limits, np.unique([*points, *edges, *reached]))
-            inner = _at(states, points)
-            rough, chosen = _rough(model, inner, len(edges) - 1, freedoms, rule)
+            times = _all_times(edges, rule, reached)
+            if not np.isin(times, states.times).all():
+                _, states = _run(scene, method, limits, times)
+            inner = _at(states, _points(edges, rule))
+            if before and edges is before.edges:
+                partitions, by_panel = before.partitions, before.by_panel
+                break
+            rough = _are_unresolved(model, inner, rule)
+            if not rough.any():
+                partitions, by_panel, rough = _partitions(model, inner, freedoms, rule)
             if not rough.any():
                 break
             edges = np.sort(np.concatenate([edges, (edges[:-1] + edges[1:])[rough] / 2]))
-        if rough.any():
+        else:
             t = edges[int(np.argmax(rough))]
             raise InputError(f"{scene.name}: the motion near t = {t:.6g} s changes too fast for derivatives")
-        if samples[0] > 0.0:
+        if samples[0] > 0.0 and not before:
             motion = _run(scene, method, limits, samples)[0]
-        first, ends = _at(states, np.zeros(1)), _at(states, edges[1:])
-        return Followed(motion, undecided, rule, first, _at(states, reached), edges, inner, ends, chosen)
+        first, ends, own = _at(states, np.zeros(1)), _at(states, edges[1:]), _at(states, reached)
+        if len(edges) > 1:
+            by_sample = by_panel[places_in(edges, reached)]
+        else:
+            partitions, by_sample, _ = _partitions(model, own, freedoms)
+        return Followed(
+            motion, undecided, rule, first, own, edges, inner, ends, partitions, by_panel, by_sample
+        )
+
+
+def places_in(edges: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return the indices (k,) of the panels in which times (k,) are."""
+    return np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(edges) - 2)
+
+
+def _all_times(edges: np.ndarray, rule: Gauss, samples: np.ndarray) -> np.ndarray:
+    """Return the edges of panels, the times of their Gauss points, and samples, s."""
+    return np.unique([*edges, *_points(edges, rule), *samples])
+
+
+def _points(edges: np.ndarray, rule: Gauss) -> np.ndarray:
+    """Return the times (panels N,) of the Gauss points of panels."""
+    return (edges[:-1, None] + np.diff(edges)[:, None] * rule.points).ravel()
 
 
 def _at(states: States, times: np.ndarray) -> States:
@@ -104,26 +148,40 @@ def _first_edges(model: Model, last: float, steps: int) -> np.ndarray:
     return np.union1d(np.linspace(0.0, last, max(1, steps // STEPS_OF_PANEL) + 1), inside)
 
 
-def _rough(
-    model: Model, points: States, panels: int, freedoms: int, rule: Gauss
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return which panels (panels,) are too long, and the independent displacements (panels, f) of each."""
-    rough, chosen = np.zeros(panels, dtype=bool), np.zeros((panels, freedoms), dtype=int)
-    if not panels:
-        return rough, chosen
-    v = (points.v / model.units).reshape(panels, len(rule.points), model.n)
-    rough = tails(v, rule) > RESOLVED * np.abs(v).max()
-    if rough.any():
-        return rough, chosen
-    for j in range(panels):
-        own = slice(j * len(rule.points), (j + 1) * len(rule.points))
-        free = TangentRows(model, points.at(own)).free
-        if free.shape[2] != freedoms:
-            raise InputError(f"the motion passes a singular position near t = {points.times[own][0]:.6g} s")
-        chosen[j] = independent_displacements(free[len(free) // 2])
-        at = free[:, chosen[j]]
-        rough[j] = np.linalg.svd(at, compute_uv=False).min(initial=1.0) < WEAK
-        if not rough[j]:
-            basis = (free @ np.linalg.inv(at)).reshape(1, len(free), -1)
-            rough[j] = tails(basis, rule)[0] > RESOLVED_BASIS * np.abs(basis).max()
-    return rough, chosen
+def _are_unresolved(model: Model, points: States, rule: Gauss) -> np.ndarray:
+    """Return which panels (panels,) are too long for the velocities at their points."""
+    v = (points.v / model.units).reshape(-1, len(rule.points), model.n)
+    return np.asarray(tails(v, rule) > RESOLVED * np.abs(v).max(initial=0.0))
+
+
+def _partitions(
+    model: Model, states: States, freedoms: int, rule: Gauss | None = None
+) -> tuple[list[Partition], np.ndarray, np.ndarray]:
+    """Return partitions, the index (panels,) of the one that each panel uses, and which panels are too long
+    for one. ``states`` (panels N,) are at the points of the rule, or without a rule one of each panel."""
+    points = len(rule.points) if rule else 1
+    count = len(states.times) // points
+    found: list[Partition] = []
+    used, rough = np.full(count, -1), np.zeros(count, dtype=bool)
+    size = max(1, MOST_ENTRIES // max(1, points * model.n * (model.m + model.n)))
+    while (left := np.flatnonzero((used < 0) & ~rough)).size:
+        middle = states.at([left[0] * points + points // 2])
+        partition = partition_of(model, middle)
+        if len(partition.independent) != freedoms:
+            raise InputError(f"the motion passes a singular position near t = {middle.times[0]:.6g} s")
+        largest = LARGEST_INVERSE * np.linalg.norm(TangentRows(model, middle, partition).inverse)
+        for panels in (left[k : k + size] for k in range(0, left.size, size)):
+            at = (panels[:, None] * points + np.arange(points)).ravel()
+            rows = TangentRows(model, states.at(at), partition)
+            fits = np.linalg.norm(rows.inverse, axis=(1, 2)) <= largest
+            fits &= np.linalg.norm(rows.basis, axis=(1, 2)) <= LARGEST_BASIS * np.sqrt(freedoms)
+            fits = fits.reshape(-1, points).all(axis=1)
+            used[panels[fits]] = len(found)
+            if rule and freedoms:
+                basis = rows.basis.reshape(len(panels), points, -1)
+                ends = tails(basis, rule) > RESOLVED_BASIS * np.abs(basis).max(axis=(1, 2))
+                rough[panels[fits]] |= ends[fits]
+        if used[left[0]] < 0:
+            used[left[0]], rough[left[0]] = len(found), rule is not None
+        found.append(partition)
+    return found, used, rough

@@ -1,24 +1,26 @@
 """Numbers of a scene with respect to which a motion is differentiated.
 
-The arrays and the start of a scene are closed forms of its numbers. Their derivatives are differences of
-order 8 between variants of the scene, whose equations are evaluated at equal states.
+The terms and the start of a scene are closed forms of its numbers. Their derivatives are differences between
+variants of the scene, whose equations are evaluated at equal states: two variants where all terms are affine
+in the number, as in most, and differences of order 8 otherwise.
 """
 
 from __future__ import annotations
 
-import itertools
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from mbref.design.derivatives.states import shortest_spring
-from mbref.design.differences import Stencil, central, one_sided
+from mbref.design.derivatives.states import States, arrays_of_terms, shortest_spring, sum_of_differences
+from mbref.design.differences import Stencil, affine, central, one_sided
+from mbref.ensembles.candidates import Evaluations
 from mbref.equations.initial_state import consistent_start
-from mbref.equations.model import Model, displacement
+from mbref.equations.model import Model, Terms, displacement
 from mbref.equations.offsets import assembled
+from mbref.equations.packing import Packs
 from mbref.equations.parts import shape_of
 from mbref.input_error import InputError
 from mbref.kernels.scene_layout import FIRST_NUMBERS, FIRST_OF_LOADS
@@ -40,14 +42,21 @@ UNITS = {  # by field
 UNITS_OF_TURNS = {"stiffness": "N m/rad", "damping": "N m s/rad", "armature": "kg m²"}
 UNITS_OF_SLIDES = {"stiffness": "N/m", "damping": "N s/m", "armature": "kg"}
 REDUCED = tuple(4.0**-k for k in range(6))  # factors on the step, the first ones preferred
+# factors and stencils that are tried in turn; those to one side only where the others leave more than ROUGH
+CENTRAL = ((1.0, affine()), *((factor, central()) for factor in REDUCED))
+ONE_SIDED = tuple((factor, one_sided(sign)) for factor in REDUCED for sign in (1.0, -1.0))
 ACCURATE = 1e-12  # relative error of a derivative of the scene's arrays from which no smaller step is tried
 ROUGH = 1e-6  # relative error above which the arrays are not smooth in the number
+# displacement of a state in general position that undoes alignments, lengths of the shortest spring or rad
+GENERAL = 0.02
+CHANGED = 100.0  # roundings of the largest value in an array, below which a value does not change
+TERMS_ROUNDING = 50.0  # roundings of the largest term that the many operations of a term may leave
 EPSILON = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
 class SceneNumber:
-    """A number of a scene: variants of the scene as models, and their weights (k,) in derivatives.
+    """A number of a scene: variants of the scene, and their weights (k,) in derivatives.
 
     ``x`` and ``v`` (n,) are the derivatives of the start: displacement (m, rad) and velocity (m/s, rad/s) by
     one unit of the number. ``error`` is relative.
@@ -55,7 +64,8 @@ class SceneNumber:
 
     label: str
     scenes: tuple[Scene, ...]
-    models: tuple[Model, ...]
+    packs: Packs
+    terms: Callable[..., Terms]
     weights: np.ndarray
     x: np.ndarray
     v: np.ndarray
@@ -63,9 +73,26 @@ class SceneNumber:
 
     def derivative(self, function: Callable[[Scene, Model], np.ndarray]) -> np.ndarray:
         """Return the derivative by the number of a function of a variant's scene and model."""
-        terms = zip(self.weights, self.scenes, self.models, strict=True)
-        parts = (weight * function(scene, model) for weight, scene, model in terms)
-        return np.asarray(sum(parts))
+        total = 0.0
+        for k in np.flatnonzero(self.weights).tolist():
+            model = Model(self.packs.scenes[k], self.packs, k)
+            total = total + self.weights[k] * function(self.scenes[k], model)
+            model.release()
+        return np.asarray(total)
+
+    def changed_terms(self, states: States) -> tuple[list[np.ndarray], np.ndarray]:
+        """Return the derivatives of ``arrays_of_terms`` at states, and of M (n,)."""
+        first, *others = np.flatnonzero(self.weights).tolist()
+        base = _terms_at(self.terms, [first], states)[0]  # the weights add up to zero
+        pairs = ((self.weights[k], _terms_at(self.terms, [k], states)[0], base) for k in others)
+        return sum_of_differences(pairs), self.weights @ self.packs.mass
+
+
+def _terms_at(terms: Callable[..., Terms], places: Sequence[int], states: States) -> Terms:
+    """Return the terms of scenes with indices (c,) at states."""
+    each = states.times, states.q, states.v, states.angles
+    many = (np.repeat(values[None], len(places), axis=0) for values in each)
+    return terms(np.asarray(places), *many)
 
 
 def scene_number(scene: Scene, label: str, base: Model, step: float) -> SceneNumber:
@@ -75,22 +102,24 @@ def scene_number(scene: Scene, label: str, base: Model, step: float) -> SceneNum
     SceneError if the path has no number, or if no value near it makes a valid scene; InputError if the
     equations do not depend on it smoothly.
     """
+    size = step * _size(number_at(scene, label), label, base)
     found: list[SceneNumber] = []
     faults: list[SceneError] = []
-    size = _size(number_at(scene, label), label, base)
-    for share, stencil in itertools.product(REDUCED, (central(), one_sided(1.0), one_sided(-1.0))):
-        try:
-            found.append(_differences(scene, label, share * step * size, stencil, base))
-        except SceneError as fault:
-            faults.append(fault)
-        if found and found[-1].error <= ACCURATE:
-            break
+    for stencils in (CENTRAL, ONE_SIDED):
+        for factor, stencil in stencils:
+            try:
+                found.append(_differences(scene, label, factor * size, stencil, base))
+            except SceneError as fault:
+                faults.append(fault)
+                continue
+            if found[-1].error <= ACCURATE:
+                return found[-1]
+        best = min(found, key=lambda number: number.error, default=None)
+        if best is not None and best.error <= ROUGH:
+            return best
     if not found:
         raise faults[-1]
-    best = min(found, key=lambda number: number.error)
-    if not best.error <= ROUGH:
-        raise InputError(f"{label}: the equations of the scene are not smooth in this number")
-    return best
+    raise InputError(f"{label}: the equations of the scene are not smooth in this number")
 
 
 def unit_of_number(scene: Scene, label: str) -> str:
@@ -127,12 +156,7 @@ def is_same_number(scene: Scene, path: str, other: str) -> bool:
 def _at(scene: Scene, path: str) -> Any:
     """Return the entry or value of a scene at a path; raises SceneError if there is none."""
     found: list[Any] = []
-
-    def keep(value: Any) -> Any:
-        found.append(value)
-        return value
-
-    replaced_at({field: getattr(scene, field) for field in Scene.model_fields}, path, keep)
+    replaced_at({field: getattr(scene, field) for field in Scene.model_fields}, path, found.append)
     return found[0]
 
 
@@ -151,32 +175,63 @@ def _differences(scene: Scene, label: str, step: float, stencil: Stencil, base: 
     scenes = tuple(scene.with_(label, value + step * offset) for offset in stencil.offsets)
     if any(shape_of(each) != shape_of(scene) for each in scenes):
         raise InputError(f"{label}: the equations change their form with this number")
-    models = tuple(Model(assembled(each)) for each in scenes)
-    if any((model.data.functions.begin != base.data.functions.begin).any() for model in models):
+    packs = Packs([*map(assembled, scenes)])
+    if (packs.data.functions.begin != base.data.functions.begin).any():
         raise InputError(
             f"{label}: the number moves the time at which a load is switched, or a row of a table"
         )
-    start = consistent_start(base)
-    starts = [consistent_start(model) for model in models]
+    variants, start = Evaluations(base, packs), consistent_start(base)
+    starts = variants.starts()
+    for each in starts:
+        if isinstance(each, SceneError):
+            raise each
+        if each.follows_branch or start.follows_branch:
+            raise InputError(
+                f"{label}: the motion starts at a singular position, where derivatives do not exist"
+            )
     x = np.array([displacement(start.q, each.q) for each in starts])
     v = np.array([each.v for each in starts])
-    if any(each.follows_branch for each in (start, *starts)):
-        raise InputError(f"{label}: the motion starts at a singular position, where derivatives do not exist")
-    error = 0.0
-    for values in (x / base.units, v / base.units, *zip(*map(_arrays, models), strict=True)):
-        table = np.array(values).reshape(len(models), -1)
-        found, lower = (weights @ table / step for weights in (stencil.weights, stencil.lower))
-        scale = np.abs(found).max(initial=0.0)
-        rounded = EPSILON * np.abs(table).max(initial=0.0) / step
-        if scale > 100 * rounded:
-            error = max(error, float((np.abs(found - lower).max() + rounded) / scale))
+    error = max(
+        _stencil_error(each, stencil, step) for each in (x / base.units, v / base.units, *_arrays(packs))
+    )
+    for each in arrays_of_terms(_terms_at(variants.terms, range(len(scenes)), _general_state(base))):
+        error = max(error, _stencil_error(each, stencil, step, TERMS_ROUNDING))
     weights = stencil.weights / step
-    return SceneNumber(label, scenes, models, weights, weights @ x, weights @ v, error)
+    return SceneNumber(label, scenes, packs, variants.terms, weights, weights @ x, weights @ v, error)
 
 
-def _arrays(model: Model) -> Iterator[np.ndarray]:
-    """Yield the arrays of a model that its equations read."""
-    data = model.data
+def _stencil_error(values: np.ndarray, stencil: Stencil, step: float, allowed: float = 0.0) -> float:
+    """Return the relative error of the derivative of values (offsets, …) that change beyond rounding: the
+    difference from the lower order beyond ``allowed`` roundings, and one rounding without any."""
+    table = values.reshape(len(values), -1)
+    changes = np.abs(table - table[0]).max(axis=0)
+    table = table[:, changes > CHANGED * EPSILON * np.abs(table).max(initial=0.0)]
+    found, lower = (weights @ table / step for weights in (stencil.weights, stencil.lower))
+    scale = np.abs(found).max(initial=0.0)
+    rounded = EPSILON * np.abs(table).max(initial=0.0) / step
+    if scale <= CHANGED * rounded:
+        return 0.0
+    off = np.abs(found - lower).max()
+    return float((max(0.0, off - allowed * rounded) if allowed else off + rounded) / scale)
+
+
+def _general_state(model: Model) -> States:
+    """Return one state near the start in general position, at the end of the scene's duration: a term that
+    is affine in a number there is affine at every state."""
+    random = np.random.default_rng(0)
+    q, n = model.start()[None], model.n
+    x = GENERAL * float(shortest_spring(model, q)[0]) * random.normal(size=n) * model.units
+    none = np.zeros((1, model.m))
+    angles = np.zeros((1, len(model.structure.places.turning)))
+    still = States(
+        np.array([model.scene.duration]), q, model.units * random.normal(size=(1, n)), angles, none, none
+    )
+    return still._replace(q=still.displaced(x[None]))
+
+
+def _arrays(packs: Packs) -> Iterator[np.ndarray]:
+    """Yield the arrays (scenes, …) that the equations read."""
+    data = packs.data
     yield from (
         data.gravity,
         *data.bodies,

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
+
+MOST_TOGETHER = 1_000_000  # entries of matrices that are solved together: 8 MB
 
 
 class Precision(NamedTuple):
@@ -48,21 +51,18 @@ def _integrals(ends: np.ndarray, analysis: np.ndarray) -> np.ndarray:
     return 0.5 * (values[:, 1:] - before) / (2 * np.arange(len(analysis)) + 1) @ analysis
 
 
-class CollocationPanel(NamedTuple):
-    """The equation y' = A y + b in a panel of ``length`` seconds: A (N, d, d) and b (N, d, c) at its
-    points."""
-
-    length: float
-    matrix: np.ndarray
-    rhs: np.ndarray
-
-    def rates(self, start: np.ndarray, rule: Gauss) -> np.ndarray:
-        """Return y' (N, d, c) at the points, of the solution with y = start (d, c)."""
-        count, size = self.matrix.shape[:2]
-        within = self.length * rule.integrals[:, None, :, None] * self.matrix[:, :, None, :]
-        system = np.eye(count * size) - within.reshape(count * size, count * size)
-        given = self.matrix @ start + self.rhs
-        return np.linalg.solve(system, given.reshape(count * size, -1)).reshape(given.shape)
+def rates_in_panels(lengths: np.ndarray, system: np.ndarray, rule: Gauss) -> Iterator[np.ndarray]:
+    """Yield for each panel of ``lengths`` (panels,), s, the rates y' (N, d, d + c) at its Gauss points: of
+    y' = A y from the d unit vectors, and of y' = A y + b from zero. ``system`` (panels, N, d, d + c) is A, b.
+    """
+    count, d = system.shape[1:3]
+    size = count * d
+    together = max(1, MOST_TOGETHER // max(1, size * size))
+    for first in range(0, len(lengths), together):
+        own, length = system[first : first + together], lengths[first : first + together]
+        within = rule.integrals[:, None, :, None] * own[:, :, :, None, :d]
+        within = length[:, None, None] * within.reshape(len(own), size, size)
+        yield from np.linalg.solve(np.eye(size) - within, own.reshape(len(own), size, -1)).reshape(own.shape)
 
 
 def tails(values: np.ndarray, rule: Gauss) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
@@ -38,8 +39,9 @@ from mbref.stepping.limits import FINEST, Limits
 
 # of a solution, and of a more accurate one. A step h (lengths of the shortest spring, or shares of a number)
 # has a truncation of about 600 h⁸ and a rounding of 2e-16/h
-FIRST_PRECISION, SECOND_PRECISION = Precision(12, 0.02), Precision(16, 0.01)
+FIRST_PRECISION, SECOND_PRECISION = Precision(16, 0.02), Precision(20, 0.01)
 RTOL = 1e-12  # default relative tolerance of the runs
+NUMBER_STEP = 0.02  # first step of differences between variants of a scene / size of the number
 FINER = 0.1  # tolerance of the more accurate run / tolerance
 ORDER = 24  # order of the series of the more accurate run
 DIFFERENCE_ROUNDING = 2e-14  # error of a difference of order 8 / largest derivative over the samples
@@ -88,11 +90,11 @@ def sensitivities(
     """
     request = DerivativeRequest(find_scene(scene), of, to, times)
     limits = limits or Limits(rtol=RTOL)
-    first = request.solved(request.method, limits, FIRST_PRECISION)
+    first, run = request.solved(request.method, limits, FIRST_PRECISION)
     finer = replace(limits, rtol=max(FINEST, FINER * limits.rtol), atol=None)
     by = Method.parse(f"{SERIES_METHOD}[order={ORDER}]") if request.method.is_series else request.method
-    second = request.solved(by, finer, SECOND_PRECISION)
-    request.release()
+    second, _ = request.solved(by, finer, SECOND_PRECISION, run)
+    request.model.release()
     return compared(first, second, request)
 
 
@@ -102,10 +104,9 @@ def motion_and_derivatives(
     """Return the motion at times (k,), s, the outputs' names, and their derivatives (k, outputs, numbers) up
     to a singular position, without an estimate of their errors. Raises the errors of ``sensitivities``."""
     request = DerivativeRequest(scene, of, to, times)
-    found = request.solved(request.method, limits, FIRST_PRECISION)
-    request.release()
-    assert request.motion is not None
-    return request.motion, found.outputs, found.values
+    found, run = request.solved(request.method, limits, FIRST_PRECISION)
+    request.model.release()
+    return run.motion, found.outputs, found.values
 
 
 def _refuse(scene: Scene, of: Sequence[str], to: Sequence[str]) -> None:
@@ -161,47 +162,42 @@ class DerivativeRequest:
             raise InputError(f"{count}; derivatives are for up to {MOST_ROWS}")
         self.method = Method.parse(default_method(scene))
         self.motion: Motion | None = None  # of the first solution
-        self.of_scene: list[SceneNumber] = []  # of the last solution
         self.units = [unit_of_number(scene, label) for label in labels]
 
-    def differentiate(self, step: float) -> list[SceneNumber]:
-        """Return the numbers that are fields of the scene, with variants at a step over their sizes."""
+    @cached_property
+    def numbers(self) -> list[SceneNumber]:
+        """The numbers that are fields of the scene."""
         fields = [label for label in self.labels if not is_of_start(label)]
-        self._release_variants()
-        self.of_scene = [scene_number(self.scene, label, self.model, step) for label in fields]
-        return self.of_scene
+        return [scene_number(self.scene, label, self.model, NUMBER_STEP) for label in fields]
 
-    def _release_variants(self) -> None:
-        for model in (variant for number in self.of_scene for variant in number.models):
-            model.release()
+    @cached_property
+    def outputs(self) -> list[str]:
+        """The columns of the motion that are differentiated."""
+        assert self.motion is not None
+        return differentiable(self.motion, self.of)
 
-    def release(self) -> None:
-        """Release the memory of the models."""
-        self._release_variants()
-        self.model.release()
-
-    def solved(self, method: Method, limits: Limits, precision: Precision) -> Derivatives:
-        """Return the derivatives of the outputs along a run by a method."""
+    def solved(
+        self, method: Method, limits: Limits, precision: Precision, before: Followed | None = None
+    ) -> tuple[Derivatives, Followed]:
+        """Return the derivatives of the outputs along a run by a method, and the run; its panels are those of
+        a run ``before``."""
         model, step = self.model, precision.step
-        run = Followed.of(self.scene, model, method, limits, self.samples, gauss(precision.points))
-        motion = run.motion
-        names = differentiable(motion, self.of)
-        numbers = self.differentiate(step)
+        run = Followed.of(self.scene, model, method, limits, self.samples, gauss(precision.points), before)
+        self.motion = self.motion or run.motion
         started = [label for label in self.labels if is_of_start(label)]
-        of_start = [start_number(label, motion, model, run.first, step) for label in started]
-        every: list[SceneNumber | StartNumber] = [*numbers, *of_start]
+        of_start = [start_number(label, self.motion, model, run.first, step) for label in started]
+        every: list[SceneNumber | StartNumber] = [*self.numbers, *of_start]
         starts = [(number.x, number.v) for number in every]
-        found = VariationalEquations(model, run, numbers, step).changes(starts)
-        columns, by_label = Columns(motion, names, step), {}
+        found = VariationalEquations(model, run, self.numbers, step).changes(starts)
+        columns, by_label = Columns(self.motion, self.outputs, step), {}
         for number, along in zip(every, found.along, strict=True):
             parts = [columns.along(model, found.states, along)]
             if isinstance(number, SceneNumber):
                 parts.append(columns.by_number(number, found.states))
             by_label[number.label] = np.sum(parts, axis=0)
         values, rounding = np.stack([by_label[label] for label in self.labels], axis=-1)
-        self.motion = self.motion or motion
-        signs = self._signs(names, found.states)[..., None]
-        return Derivatives(run.undecided_from, names, signs * values, rounding)
+        signs = self._signs(self.outputs, found.states)[..., None]
+        return Derivatives(run.undecided_from, self.outputs, signs * values, rounding), run
 
     def _signs(self, names: Sequence[str], states: States) -> np.ndarray:
         """Return -1 for columns (k, outputs) of quaternions that have the other sign in the first motion."""
@@ -218,7 +214,7 @@ class DerivativeRequest:
     def errors(self, values: np.ndarray) -> np.ndarray:
         """Return the errors (k, o, p) that differences of the scene's arrays and of states leave in
         derivatives."""
-        relative = {number.label: number.error for number in self.of_scene}
+        relative = {number.label: number.error for number in self.numbers}
         share = np.array([DIFFERENCE_ROUNDING + relative.get(label, 0.0) for label in self.labels])
         return np.asarray(share * np.abs(values).max(axis=0, initial=0.0, keepdims=True))
 

@@ -12,7 +12,7 @@ from mbref.design.derivatives.states import Direction, States
 from mbref.design.derivatives.tangents import (
     MASSLESS,
     TangentRows,
-    independent_displacements,
+    partition_of,
     tangents_at,
     with_accelerations,
 )
@@ -49,14 +49,12 @@ def start_number(label: str, motion: Motion, model: Model, state: States, step: 
     column = f"{name}.{coordinate}"
     if column not in motion.columns():
         raise InputError(f"{label}: the scene has no joint {name!r} with this coordinate")
-    rows = TangentRows(model, state)
-    state = with_accelerations(model, state, rows)
-    free = rows.free[0]
-    if not free.shape[1]:
+    rows = TangentRows(model, state, partition_of(model, state))
+    state = with_accelerations(state, rows)
+    f, units = rows.basis.shape[2], model.units
+    if not f:
         raise InputError(f"{label}: drivers prescribe the whole motion, also at the start")
-    chosen = independent_displacements(free)[None]
-    each = tangents_at(model, state, rows, chosen, [], step)
-    f, units = chosen.shape[1], model.units
+    each = tangents_at(model, state, rows, [], step)
     x, v = each.x[0] * units[:, None], each.v[0] * units[:, None]
     columns, none = Columns(motion, [column], step), np.zeros((1, model.m))
     still = np.zeros((1, model.n))

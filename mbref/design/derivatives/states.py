@@ -1,4 +1,4 @@
-"""States of a run at many times, and the residuals of the equations of motion there.
+"""States of a run at many times, and changes of the residuals of the equations of motion there.
 
 A displacement of coordinates q (7 nb,) is x (n,), see ``model.displaced``. The residuals of k states are
 one array (k, 3 m + n): Φ, Φ_q v - ν, Φ_q a - γ and M a + Φ_qᵀ λ - g.
@@ -6,18 +6,16 @@ one array (k, 3 m + n): Φ, Φ_q v - ν, Φ_q a - γ and M a + Φ_qᵀ λ - g.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
 from mbref import rotations
-from mbref.design.differences import directional_derivative
+from mbref.design.differences import CENTRAL
 from mbref.equations.coordinates import displace_all
 from mbref.equations.model import Model, Terms
 from mbref.kernels.scene_layout import SPRING
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
 
 FAST = 10.0  # of which residuals and outputs are polynomials of low degree, so that only rounding limits it
 
@@ -39,15 +37,20 @@ class States(NamedTuple):
 
     def moved(self, along: Direction, steps: np.ndarray) -> States:
         """Return the states displaced along a direction by steps (k,)."""
-        q, h = self.q.copy(), steps[:, None]
-        displace_all(q, np.ascontiguousarray(h * along.x), np.zeros(q.shape[1]))
+        h = steps[:, None]
         parts = (
             self.v + h * along.v,
             self.angles,
             self.a + h * along.a,
             self.multipliers + h * along.multipliers,
         )
-        return States(self.times, q, *parts)
+        return States(self.times, self.displaced(h * along.x), *parts)
+
+    def displaced(self, x: np.ndarray) -> np.ndarray:
+        """Return the coordinates displaced by x (k, n)."""
+        q = self.q.copy()
+        displace_all(q, np.ascontiguousarray(x), np.zeros(q.shape[1]))
+        return q
 
 
 class Direction(NamedTuple):
@@ -96,34 +99,64 @@ def terms_along(model: Model, states: States) -> Terms:
     return model.terms(states.times, states.q, states.v, states.angles)
 
 
-def residuals(model: Model, states: States) -> np.ndarray:
-    """Return the residuals (k, 3 m + n) of the equations at states."""
-    terms = terms_along(model, states)
-    blocks, count = terms.blocks, len(states.times)
-
-    def along(vectors: np.ndarray) -> np.ndarray:
-        padded = np.concatenate([vectors, np.zeros((count, 6))], axis=1)  # no velocity of the fixed frame
-        return np.asarray((blocks * padded[:, model.entry_columns]).sum(axis=2))
-
-    pulls = (blocks * states.multipliers[:, :, None]).reshape(count, -1) @ model.once(_incidence)
-    force = terms.mass * states.a + pulls[:, : model.n] - terms.force
-    rates = along(states.v) - terms.nu, along(states.a) - terms.gamma
-    return np.concatenate([terms.phi, *rates, force], axis=1)
+def arrays_of_terms(terms: Terms) -> list[np.ndarray]:
+    """Return blocks, Φ, ν, γ and g of terms."""
+    return [terms.blocks, terms.phi, terms.nu, terms.gamma, terms.force]
 
 
-def _incidence(model: Model) -> csr_array:
-    """Return the matrix (12 m, n + 6) that adds the entries of the blocks to their columns."""
-    from scipy.sparse import csr_array
+def sum_of_differences(weighted: Iterable[tuple[float, Terms, Terms]]) -> list[np.ndarray]:
+    """Return Σ w (T₁ - T₂) over weights w and pairs of terms, as ``arrays_of_terms``."""
+    total: list[np.ndarray] = []
+    for weight, ahead, behind in weighted:
+        parts = [one - other for one, other in zip(*map(arrays_of_terms, (ahead, behind)), strict=True)]
+        for place, part in enumerate(parts):
+            np.multiply(part, weight, out=part)
+            if total:
+                total[place] += part
+        total = total or parts
+    return total
 
-    columns = model.entry_columns.ravel()
-    return csr_array((np.ones(columns.size), (np.arange(columns.size), columns)), (columns.size, model.n + 6))
 
+class Residuals:
+    """Changes of the residuals at k states whose accelerations and multipliers are constant."""
 
-def change_along(model: Model, states: States, along: Direction, step: float) -> np.ndarray:
-    """Return the derivative (k, 3 m + n) of the residuals along a direction, by differences of a step."""
-    steps = along.steps(states, model, step)
-    if not along.x.any():  # residuals are polynomials of degree 2 in v
-        ahead, behind = (residuals(model, states.moved(along, sign * steps)) for sign in (1.0, -1.0))
-        return (ahead - behind) / (2.0 * steps[:, None])
-    change = directional_derivative(lambda h: residuals(model, states.moved(along, h)), steps)
-    return np.asarray(change / steps[:, None])
+    def __init__(self, model: Model, states: States):
+        self.model, self.states = model, states
+        fixed, columns = np.zeros((len(states.times), 6)), model.entry_columns  # of the fixed frame
+        self._v, self._a = (np.concatenate([w, fixed], axis=1)[:, columns] for w in (states.v, states.a))
+        bodies = columns[:, ::6].ravel() // 6
+        self._of_body = (np.minimum(bodies, model.nb) == np.arange(model.nb)[:, None]).astype(float)
+
+    def along(self, x: np.ndarray, step: float) -> np.ndarray:
+        """Return the change (k, 3 m + n) by displacements x (k, n), by differences of a step, see
+        ``Direction.steps``."""
+        model, states, still = self.model, self.states, np.zeros_like(x)
+        steps = Direction(x, still, still, states.multipliers[:, :0]).steps(states, model, step)[:, None]
+
+        def at(h: np.ndarray) -> Terms:
+            return terms_along(model, states._replace(q=states.displaced(h * x)))
+
+        pairs = ((w, at(k * steps), at(-k * steps)) for k, w in enumerate(CENTRAL, 1))
+        return self.of_terms(sum_of_differences(pairs)) / steps
+
+    def by_velocity(self, v: np.ndarray) -> np.ndarray:
+        """Return the change (k, 3 m + n) by changes of velocity v (k, n) in γ and g, which are polynomials of
+        degree 2; the change of Φ_q v - ν is left out."""
+        still, states = np.zeros_like(v), self.states
+        h = Direction(still, v, still, states.multipliers[:, :0]).steps(states, self.model, 1.0)[:, None]
+        ahead, behind = (terms_along(self.model, states._replace(v=states.v + s * v)) for s in (h, -h))
+        gamma, force = (ahead.gamma - behind.gamma) / (2 * h), (ahead.force - behind.force) / (2 * h)
+        return np.concatenate([np.zeros((len(v), 2 * self.model.m)), -gamma, -force], axis=1)
+
+    def of_terms(self, change: list[np.ndarray], mass: np.ndarray | float = 0.0) -> np.ndarray:
+        """Return the change (k, 3 m + n) by a change of ``arrays_of_terms`` and of M (n,)."""
+        blocks, phi, nu, gamma, force = change
+        (count, m), n = phi.shape, self.model.n
+        rates, pulls = np.zeros((2, count, m)), np.zeros((count, n))
+        if blocks.any():
+            for rate, w in zip(rates, (self._v, self._a), strict=True):
+                np.einsum("kmj,kmj->km", blocks, w, out=rate)
+            pulled = (blocks * self.states.multipliers[:, :, None]).reshape(count, -1, 6)
+            pulls = (self._of_body @ pulled).reshape(count, n)
+        own = mass * self.states.a + pulls - force
+        return np.concatenate([phi, rates[0] - nu, rates[1] - gamma, own], axis=1)

@@ -7,21 +7,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mbref.design.derivatives.followed import Followed
+from mbref.design.derivatives.followed import Followed, places_in
 from mbref.design.derivatives.numbers_of_scene import SceneNumber
-from mbref.design.derivatives.panels import CollocationPanel
+from mbref.design.derivatives.panels import rates_in_panels
 from mbref.design.derivatives.states import Direction, States
 from mbref.design.derivatives.tangents import (
+    MOST_ENTRIES,
     TangentRows,
     Tangents,
-    independent_displacements,
     tangents_at,
     with_accelerations,
 )
 from mbref.equations.model import Model
 from mbref.input_error import InputError
-
-MOST_ENTRIES = 4_000_000  # entries of Φ_q at states whose tangents are computed together: 32 MB
 
 StartChange = tuple[np.ndarray, np.ndarray]  # changes x and v (n,) of the start by a number, SI units
 
@@ -38,45 +36,34 @@ class VariationalEquations:
 
     def __init__(self, model: Model, run: Followed, numbers: Sequence[SceneNumber], step: float):
         self.model, self.run, self.numbers, self.rule, self.step = model, run, numbers, run.rule, step
-        self.freedoms = run.chosen.shape[1]
+        self.freedoms = len(run.partitions[0].independent) if run.partitions else 0
 
     def changes(self, starts: Sequence[StartChange]) -> Changes:
         """Return the changes of the samples' states by all starts: of the numbers first, in their order."""
-        run, units, count = self.run, self.model.units, len(starts)
-        panels = len(run.edges) - 1
-        place = np.searchsorted(run.edges, run.states.times, side="right") - 1
-        place = np.clip(place, 0, max(0, panels - 1))
-        chosen = run.chosen[place] if panels else self._chosen_at_rest()
-        y = np.zeros((len(place), 2 * self.freedoms, count))
-        if self.freedoms and len(place):
-            x, v = (np.array([start[k] / units for start in starts]).reshape(count, -1) for k in range(2))
-            at_start = (run.chosen if panels else chosen)[0]
+        run, model, count = self.run, self.model, len(starts)
+        samples, has_panels = len(run.states.times), len(run.edges) > 1
+        y = np.zeros((samples, 2 * self.freedoms, count))
+        if self.freedoms and samples:
+            x, v = (
+                np.array([start[k] / model.units for start in starts]).reshape(count, -1) for k in range(2)
+            )
+            at_start = run.partitions[(run.by_panel if has_panels else run.by_sample)[0]].independent
             first = np.concatenate([x[:, at_start], v[:, at_start]], axis=1).T
-            if panels:
-                self._integrate(first, place, y)
+            if has_panels:
+                self._integrate(first, places_in(run.edges, run.states.times), y)
             else:
                 y[:] = first
-        states, parts = [], []
-        for part, own, found in self._tangents(run.states, chosen):
-            states.append(own)
-            parts.append(self._total(found, y[part]))
-        joined = (
-            [np.concatenate(each) for each in zip(*parts, strict=True)] if parts else self._nothing(count)
-        )
-        reached = States(*map(np.concatenate, zip(*states, strict=True))) if states else run.states
-        si = joined[0] * units[:, None], joined[1] * units[:, None], joined[2], joined[3]
+        sizes = (model.n, model.n, model.n, model.m)
+        a, multipliers = np.zeros((samples, model.n)), np.zeros((samples, model.m))
+        changed = [np.zeros((samples, size, count)) for size in sizes]
+        for part, own, found in self._tangents(run.states, run.by_sample):
+            a[part], multipliers[part] = own.a, own.multipliers
+            for whole, each in zip(changed, self._total(found, y[part]), strict=True):
+                whole[part] = each
+        units = model.units[:, None]
+        si = changed[0] * units, changed[1] * units, changed[2], changed[3]
+        reached = run.states._replace(a=a, multipliers=multipliers)
         return Changes(reached, [Direction(*(each[..., k] for each in si)) for k in range(count)])
-
-    def _nothing(self, count: int) -> list[np.ndarray]:
-        return [np.zeros((0, size, count)) for size in (self.model.n,) * 3 + (self.model.m,)]
-
-    def _chosen_at_rest(self) -> np.ndarray:
-        """Return the independent displacements (k, f) of samples in no panel, which are at t = 0."""
-        count = self.run.states.times.size
-        if not count or not self.freedoms:
-            return np.zeros((count, self.freedoms), dtype=int)
-        free = TangentRows(self.model, self.run.first).free[0]
-        return independent_displacements(free)[None]
 
     def _total(self, found: Tangents, y: np.ndarray) -> list[np.ndarray]:
         """Return changes x, v, a, λ (k, ·, starts) for y (k, 2 f, starts), with the numbers' own parts."""
@@ -87,33 +74,37 @@ class VariationalEquations:
             total.append(whole)
         return total
 
-    def _tangents(self, states: States, chosen: np.ndarray) -> Iterator[tuple[slice, States, Tangents]]:
-        """Yield tangents of parts of the states (k,), with the states' accelerations."""
-        model = self.model
-        size = max(1, MOST_ENTRIES // max(1, model.m * model.n))
-        for first in range(0, states.times.size, size):
-            part = slice(first, min(first + size, states.times.size))
-            own = states.at(part)
-            rows = TangentRows(model, own)
-            own = with_accelerations(model, own, rows)
-            found = tangents_at(model, own, rows, chosen[part], self.numbers, self.step)
-            for number, is_open in zip(self.numbers, found.open, strict=True):
-                if is_open:
-                    raise InputError(f"{number.label}: the joints cannot stay closed if this number changes")
-            yield part, own, found
+    def _tangents(self, states: States, used: np.ndarray) -> Iterator[tuple[np.ndarray, States, Tangents]]:
+        """Yield the indices of states whose tangents are computed together, these states with accelerations,
+        and their tangents by the partitions with indices ``used`` (k,)."""
+        model, columns = self.model, 2 * self.freedoms + len(self.numbers)
+        entries = model.n * (model.m + model.n) + (3 * model.m + 4 * model.n) * columns
+        size = max(1, MOST_ENTRIES // max(1, entries))
+        for index, partition in enumerate(self.run.partitions):
+            places = np.flatnonzero(used == index)
+            for part in (places[k : k + size] for k in range(0, places.size, size)):
+                rows = TangentRows(model, own := states.at(part), partition)
+                own = with_accelerations(own, rows)
+                found = tangents_at(model, own, rows, self.numbers, self.step)
+                for number, is_open in zip(self.numbers, found.open, strict=True):
+                    if is_open:
+                        raise InputError(
+                            f"{number.label}: the joints cannot stay closed if this number changes"
+                        )
+                yield part, own, found
 
     def _integrate(self, y: np.ndarray, place: np.ndarray, at_samples: np.ndarray) -> None:
         """Integrate y (2 f, starts) over all panels; write it at the samples (k, 2 f, starts) in panels
         ``place`` (k,)."""
         run, rule, d = self.run, self.rule, 2 * self.freedoms
-        lengths, count = np.diff(run.edges), len(rule.points)
-        system = self._system(d)
+        lengths, count, numbers = np.diff(run.edges), len(rule.points), len(self.numbers)
+        system = self._system(d).reshape(len(lengths), count, d, -1)
         handed = self._handed_over(d)
-        for j, length in enumerate(lengths.tolist()):
-            own = system[j * count : (j + 1) * count]
-            rhs = np.zeros((count, d, y.shape[1]))
-            rhs[..., : len(self.numbers)] = own[..., d:]
-            rates = CollocationPanel(length, own[..., :d], rhs).rates(y, rule)
+        for j, (length, own) in enumerate(
+            zip(lengths.tolist(), rates_in_panels(lengths, system, rule), strict=True)
+        ):
+            rates = own[..., :d] @ y
+            rates[..., :numbers] += own[..., d:]
             for k in np.flatnonzero(place == j):
                 share = (run.states.times[k] - run.edges[j]) / length
                 at_samples[k] = y + length * np.tensordot(rule.integrals_to(share), rates, 1)
@@ -121,30 +112,37 @@ class VariationalEquations:
             if j in handed:
                 matrix, rest = handed[j]
                 y = matrix @ y
-                y[:, : len(self.numbers)] += rest
+                y[:, :numbers] += rest
 
     def _system(self, d: int) -> np.ndarray:
         """Return A and b (panels N, 2 f, 2 f + numbers) at all points of the panels."""
-        chosen = np.repeat(self.run.chosen, len(self.rule.points), axis=0)
-        found = np.empty((len(chosen), d, d + len(self.numbers)))
-        for part, own, each in self._tangents(self.run.points, chosen):
-            rate, at = each.v.copy(), chosen[part][..., None]
+        used = np.repeat(self.run.by_panel, len(self.rule.points))
+        found = np.empty((len(used), d, d + len(self.numbers)))
+        for part, own, each in self._tangents(self.run.points, used):
+            at = self.run.partitions[used[part[0]]].independent
+            rate = each.v.copy()
             by_body = each.x.reshape(len(own.times), self.model.nb, 6, -1)[:, :, 3:]
-            spin = np.broadcast_to(own.v.reshape(-1, self.model.nb, 6)[:, :, 3:, None], by_body.shape)
-            turned = np.cross(spin, by_body, axis=2)
-            rate.reshape(*by_body.shape[:2], 6, -1)[:, :, 3:] -= turned
-            second = each.a / self.model.units[:, None]
-            found[part] = np.concatenate([np.take_along_axis(z, at, axis=1) for z in (rate, second)], axis=1)
+            spin = own.v.reshape(-1, self.model.nb, 6)[:, :, 3:, None]
+            rate.reshape(*by_body.shape[:2], 6, -1)[:, :, 3:] -= _cross(spin, by_body)
+            second = each.a[:, at] / self.model.units[at, None]
+            found[part] = np.concatenate([rate[:, at], second], axis=1)
         return found
 
     def _handed_over(self, d: int) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-        """Return by panel the linear map from y at its end to the y of the next panel, which has other
-        independent displacements."""
-        chosen = self.run.chosen
-        places = np.flatnonzero((chosen[1:] != chosen[:-1]).any(axis=1))
+        """Return by panel the linear map from y at its end to the y of the next panel, which has another
+        partition."""
+        used = self.run.by_panel
+        places = np.flatnonzero(used[1:] != used[:-1])
         found = {}
-        for part, _, each in self._tangents(self.run.ends.at(places), chosen[places]):
+        for part, _, each in self._tangents(self.run.ends.at(places), used[places]):
             for i, j in enumerate(places[part].tolist()):
-                rows = np.concatenate([each.x[i][chosen[j + 1]], each.v[i][chosen[j + 1]]])
+                at = self.run.partitions[used[j + 1]].independent
+                rows = np.concatenate([each.x[i][at], each.v[i][at]])
                 found[j] = rows[:, :d], rows[:, d:]
         return found
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return cross products of vectors along the third axis."""
+    (x, y, z), (u, v, w) = np.moveaxis(a, 2, 0), np.moveaxis(b, 2, 0)
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=2)
