@@ -13,6 +13,7 @@ from mbref.simulation import VERSION
 if TYPE_CHECKING:
     from mbref.design.along_motion import AlongMotion, along_motion
     from mbref.design.derivatives.at_rest import equilibrium_sensitivities
+    from mbref.design.derivatives.eigenvalues import EigenvalueSensitivities, eigenvalue_sensitivities
     from mbref.design.derivatives.fit import FitResult, fit
     from mbref.design.derivatives.result import Sensitivities
     from mbref.design.derivatives.sensitivities import sensitivities
@@ -43,6 +44,7 @@ __version__ = VERSION
 
 _PUBLIC = {  # module → its public names
     "design.derivatives.at_rest": ("equilibrium_sensitivities",),
+    "design.derivatives.eigenvalues": ("EigenvalueSensitivities", "eigenvalue_sensitivities"),
     "design.derivatives.fit": ("FitResult", "fit"),
     "design.derivatives.result": ("Sensitivities",),
     "design.derivatives.sensitivities": ("sensitivities",),
@@ -77,6 +79,7 @@ __all__ = [
     "AlongMotion",
     "Cost",
     "Diagnosis",
+    "EigenvalueSensitivities",
     "Equilibrium",
     "ErrorEstimate",
     "FitResult",
@@ -97,6 +100,7 @@ __all__ = [
     "assembled",
     "counts",
     "diagnose",
+    "eigenvalue_sensitivities",
     "ensemble",
     "equilibria",
     "equilibrium_sensitivities",

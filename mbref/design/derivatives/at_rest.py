@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from mbref.design.derivatives.columns import Columns
-from mbref.design.derivatives.panels import Precision
 from mbref.design.derivatives.result import Sensitivities
 from mbref.design.derivatives.sensitivities import (
     FIRST_PRECISION,
@@ -20,14 +20,15 @@ from mbref.design.derivatives.sensitivities import (
 from mbref.design.derivatives.start_numbers import is_of_start
 from mbref.design.derivatives.states import Direction, States
 from mbref.design.derivatives.tangents import (
+    Partition,
     TangentRows,
     partition_of,
     tangents_at,
     with_accelerations,
 )
 from mbref.equations.initial_state import consistent_start
+from mbref.equations.model import Model
 from mbref.input_error import InputError
-from mbref.motions.motion import Motion
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 from mbref.simulation.simulate import simulate
@@ -67,51 +68,82 @@ def equilibrium_sensitivities(
         If the scene is not at rest in an equilibrium, has no masses, or is in neutral equilibrium, and for
         the reasons of ``sensitivities``.
     """
+    request = equilibrium_request(scene, of, to)
+    motion = simulate(request.scene, times=[0.0])
+    if not motion.times.size:
+        raise InputError(f"{request.scene.name}: {motion.message}")
+    request.motion = motion
+    first, second = (_solved(request, each.step) for each in (FIRST_PRECISION, SECOND_PRECISION))
+    request.model.release()
+    return compared(first, second, request)
+
+
+def equilibrium_request(
+    scene: Scene | str | Path, of: Sequence[str] | None, to: Sequence[str]
+) -> DerivativeRequest:
+    """Return the request for derivatives of a scene at rest; raises InputError for one without masses and
+    for numbers of the start."""
     scene = find_scene(scene)
     if not scene.has_mass():
         raise InputError(f"{scene.name}: an equilibrium needs the mass and inertia of every body")
     for label in to:
         if is_of_start(label):
             raise InputError(f"{label}: an equilibrium does not depend on numbers of the start")
-    request, motion = DerivativeRequest(scene, of, to, [0.0]), simulate(scene, times=[0.0])
-    if not motion.times.size:
-        raise InputError(f"{scene.name}: {motion.message}")
-    request.motion = motion
-    first, second = (_solved(request, motion, each) for each in (FIRST_PRECISION, SECOND_PRECISION))
-    request.model.release()
-    return compared(first, second, request)
+    return DerivativeRequest(scene, of, to, [0.0])
 
 
-def _solved(request: DerivativeRequest, motion: Motion, precision: Precision) -> Derivatives:
-    """Return the derivatives (1, outputs, numbers) at the equilibrium, and the rounding of differences."""
-    model, step = request.model, precision.step
-    numbers = request.numbers
+class MovedEquilibrium(NamedTuple):
+    """The state (1,) of an equilibrium, the partition of its rows, and the changes of the pose x (n, numbers)
+    in m and rad, and of the multipliers (m, numbers), by numbers of the scene."""
+
+    state: States
+    partition: Partition
+    x: np.ndarray
+    multipliers: np.ndarray
+
+
+def moved_equilibrium(request: DerivativeRequest, step: float) -> MovedEquilibrium:
+    """Return how the equilibrium moves; raises InputError for a scene that is in none, or in a neutral
+    one."""
+    model, name = request.model, request.scene.name
     start = consistent_start(model)
     if start.v.any():
-        raise InputError(f"{request.scene.name}: is not at rest; {FIND_EQUILIBRIUM}")
-    none = np.zeros((1, model.n)), np.zeros((1, model.m))
-    angles = np.zeros((1, len(model.structure.places.turning)))
-    state = States(np.zeros(1), start.q[None], none[0], angles, *none)
+        raise InputError(f"{name}: is not at rest; {FIND_EQUILIBRIUM}")
+    state = state_at_rest(model, start.q)
     rows = TangentRows(model, state, partition_of(model, state))
     driven = np.abs(rows.placed(rows.terms.gamma[..., None])).max(initial=0.0) * request.scene.duration**2
     if driven > AT_BALANCE:  # displacement in the scene's duration
-        raise InputError(f"{request.scene.name}: is not in equilibrium; a driver accelerates it")
+        raise InputError(f"{name}: is not in equilibrium; a driver accelerates it")
     state = with_accelerations(state, rows)
-    found, f = tangents_at(model, state, rows, numbers, step), rows.basis.shape[2]
+    found, f = tangents_at(model, state, rows, request.numbers, step), rows.basis.shape[2]
     # a by (u, u', numbers), and a itself
     rates = np.concatenate([found.a[0], state.a.T], axis=1)[rows.partition.independent]
     stiffness = np.linalg.svd(rates[:, :f], compute_uv=False)
     if stiffness.min(initial=np.inf) <= NEUTRAL * stiffness.max(initial=0.0):
-        raise InputError(f"{request.scene.name}: a neutral equilibrium does not determine its pose")
+        raise InputError(f"{name}: a neutral equilibrium does not determine its pose")
     moved = -np.linalg.solve(rates[:, :f], rates[:, 2 * f :])
     if np.abs(found.x[0][:, :f] @ moved[:, -1]).max(initial=0.0) > AT_BALANCE:
-        raise InputError(f"{request.scene.name}: is not in equilibrium; {FIND_EQUILIBRIUM}")
-    columns, pairs = Columns(motion, request.outputs, step), []
-    for k, number in enumerate(numbers):
-        x, multipliers = (
-            each[..., :f] @ moved[:, k] + each[..., 2 * f + k] for each in (found.x, found.multipliers)
-        )
-        along = Direction(x * model.units, none[0], none[0], multipliers)
-        pairs.append(np.add(columns.along(model, state, along), columns.by_number(number, state)))
+        raise InputError(f"{name}: is not in equilibrium; {FIND_EQUILIBRIUM}")
+    x, multipliers = (
+        each[0][:, :f] @ moved[:, :-1] + each[0][:, 2 * f :] for each in (found.x, found.multipliers)
+    )
+    return MovedEquilibrium(state, rows.partition, x * model.units[:, None], multipliers)
+
+
+def state_at_rest(model: Model, q: np.ndarray) -> States:
+    """Return the state (1,) at rest at coordinates q (7 nb,), without accelerations."""
+    none, angles = np.zeros((1, model.n)), np.zeros((1, len(model.structure.places.turning)))
+    return States(np.zeros(1), q[None], none, angles, none, np.zeros((1, model.m)))
+
+
+def _solved(request: DerivativeRequest, step: float) -> Derivatives:
+    """Return the derivatives (1, outputs, numbers) at the equilibrium, and the rounding of differences."""
+    found, model, pairs = moved_equilibrium(request, step), request.model, []
+    assert request.motion is not None
+    columns, still = Columns(request.motion, request.outputs, step), np.zeros((1, model.n))
+    for k, number in enumerate(request.numbers):
+        along = Direction(found.x[None, :, k], still, still, found.multipliers[None, :, k])
+        by_state = columns.along(model, found.state, along)
+        pairs.append(np.add(by_state, columns.by_number(number, found.state)))
     values, rounding = np.stack(pairs, axis=-1)
     return Derivatives(np.inf, columns.names, values, rounding)

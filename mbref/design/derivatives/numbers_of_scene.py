@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -54,17 +54,57 @@ TERMS_ROUNDING = 50.0  # roundings of the largest term that the many operations 
 EPSILON = float(np.finfo(float).eps)
 
 
+class Variants(NamedTuple):
+    """Scenes whose number at a path differs by a step times the offsets of a stencil, packed."""
+
+    scenes: tuple[Scene, ...]
+    packs: Packs
+    stencil: Stencil
+    step: float
+
+    @staticmethod
+    def of(scene: Scene, label: str, step: float, stencil: Stencil, base: Model) -> Variants:
+        """Return the variants of a scene; raises SceneError if one is not valid, and InputError if they
+        differ in more than numbers."""
+        value = number_at(scene, label)
+        scenes = tuple(scene.with_(label, value + step * offset) for offset in stencil.offsets)
+        if any(shape_of(each) != shape_of(scene) for each in scenes):
+            raise InputError(f"{label}: the equations change their form with this number")
+        packs = Packs([*map(assembled, scenes)])
+        if (packs.data.functions.begin != base.data.functions.begin).any():
+            raise InputError(
+                f"{label}: the number moves the time at which a load is switched, or a row of a table"
+            )
+        return Variants(scenes, packs, stencil, step)
+
+    def model(self, place: int) -> Model:
+        """Return the model of the scene with an index."""
+        return Model(self.packs.scenes[place], self.packs, place)
+
+
+def variants_of(scene: Scene, label: str, base: Model, step: float) -> Variants:
+    """Return variants for differences of order 8, with the largest step up to one that leaves all scenes
+    valid; central if possible. ``base`` and ``step`` are as of ``scene_number``."""
+    size = step * _size(number_at(scene, label), label, base)
+    faults: list[SceneError] = []
+    for factor, stencil in (*CENTRAL[1:], *ONE_SIDED):
+        try:
+            return Variants.of(scene, label, factor * size, stencil, base)
+        except SceneError as fault:
+            faults.append(fault)
+    raise faults[-1]
+
+
 @dataclass(frozen=True)
 class SceneNumber:
     """A number of a scene: variants of the scene, and their weights (k,) in derivatives.
 
-    ``x`` and ``v`` (n,) are the derivatives of the start: displacement (m, rad) and velocity (m/s, rad/s) by
-    one unit of the number. ``error`` is relative.
+    ``terms`` evaluates the variants. ``x`` and ``v`` (n,) are the derivatives of the start: displacement
+    (m, rad) and velocity (m/s, rad/s) by one unit of the number. ``error`` is relative.
     """
 
     label: str
-    scenes: tuple[Scene, ...]
-    packs: Packs
+    variants: Variants
     terms: Callable[..., Terms]
     weights: np.ndarray
     x: np.ndarray
@@ -75,8 +115,8 @@ class SceneNumber:
         """Return the derivative by the number of a function of a variant's scene and model."""
         total = 0.0
         for k in np.flatnonzero(self.weights).tolist():
-            model = Model(self.packs.scenes[k], self.packs, k)
-            total = total + self.weights[k] * function(self.scenes[k], model)
+            model = self.variants.model(k)
+            total = total + self.weights[k] * function(self.variants.scenes[k], model)
             model.release()
         return np.asarray(total)
 
@@ -85,7 +125,7 @@ class SceneNumber:
         first, *others = np.flatnonzero(self.weights).tolist()
         base = _terms_at(self.terms, [first], states)[0]  # the weights add up to zero
         pairs = ((self.weights[k], _terms_at(self.terms, [k], states)[0], base) for k in others)
-        return sum_of_differences(pairs), self.weights @ self.packs.mass
+        return sum_of_differences(pairs), self.weights @ self.variants.packs.mass
 
 
 def _terms_at(terms: Callable[..., Terms], places: Sequence[int], states: States) -> Terms:
@@ -171,17 +211,9 @@ def _size(value: float, path: str, base: Model) -> float:
 
 def _differences(scene: Scene, label: str, step: float, stencil: Stencil, base: Model) -> SceneNumber:
     """Return the number with variants at a step times the offsets of a stencil."""
-    value = number_at(scene, label)
-    scenes = tuple(scene.with_(label, value + step * offset) for offset in stencil.offsets)
-    if any(shape_of(each) != shape_of(scene) for each in scenes):
-        raise InputError(f"{label}: the equations change their form with this number")
-    packs = Packs([*map(assembled, scenes)])
-    if (packs.data.functions.begin != base.data.functions.begin).any():
-        raise InputError(
-            f"{label}: the number moves the time at which a load is switched, or a row of a table"
-        )
-    variants, start = Evaluations(base, packs), consistent_start(base)
-    starts = variants.starts()
+    variants = Variants.of(scene, label, step, stencil, base)
+    evaluations, start = Evaluations(base, variants.packs), consistent_start(base)
+    starts = evaluations.starts()
     for each in starts:
         if isinstance(each, SceneError):
             raise each
@@ -191,13 +223,12 @@ def _differences(scene: Scene, label: str, step: float, stencil: Stencil, base: 
             )
     x = np.array([displacement(start.q, each.q) for each in starts])
     v = np.array([each.v for each in starts])
-    error = max(
-        _stencil_error(each, stencil, step) for each in (x / base.units, v / base.units, *_arrays(packs))
-    )
-    for each in arrays_of_terms(_terms_at(variants.terms, range(len(scenes)), _general_state(base))):
+    arrays = x / base.units, v / base.units, *_arrays(variants.packs)
+    error = max(_stencil_error(each, stencil, step) for each in arrays)
+    for each in arrays_of_terms(_terms_at(evaluations.terms, range(len(starts)), _general_state(base))):
         error = max(error, _stencil_error(each, stencil, step, TERMS_ROUNDING))
     weights = stencil.weights / step
-    return SceneNumber(label, scenes, packs, variants.terms, weights, weights @ x, weights @ v, error)
+    return SceneNumber(label, variants, evaluations.terms, weights, weights @ x, weights @ v, error)
 
 
 def _stencil_error(values: np.ndarray, stencil: Stencil, step: float, allowed: float = 0.0) -> float:

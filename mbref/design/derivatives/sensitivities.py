@@ -109,11 +109,12 @@ def motion_and_derivatives(
     return run.motion, found.outputs, found.values
 
 
-def _refuse(scene: Scene, of: Sequence[str], to: Sequence[str]) -> None:
-    """Raise InputError for scenes without derivatives, and for a request without outputs or numbers."""
+def _refuse(scene: Scene, of: Sequence[str] | None, to: Sequence[str]) -> None:
+    """Raise InputError for scenes without derivatives, and for an empty list of outputs or numbers."""
     if is_intermittent(scene):
         raise InputError(f"{scene.name}: intervals (`active`) and end stops have no derivatives here")
-    _refuse_no_list("of", of)
+    if of is not None:
+        _refuse_no_list("of", of)
     refuse_repeats(scene, "to", to)
 
 
@@ -147,7 +148,7 @@ class DerivativeRequest:
     def __init__(
         self,
         scene: Scene,
-        of: Sequence[str],
+        of: Sequence[str] | None,
         labels: Sequence[str],
         times: Sequence[float] | np.ndarray | None,
     ):
@@ -155,7 +156,7 @@ class DerivativeRequest:
         if self.samples[-1] > scene.duration:
             scene = scene.with_(duration=float(self.samples[-1]))
         _refuse(scene, of, labels)
-        self.scene, self.of, self.labels = scene, of, tuple(labels)
+        self.scene, self.of, self.labels = scene, of or (), tuple(labels)
         self.model = Model(assembled(scene))
         if self.model.m > MOST_ROWS:
             count = f"{scene.name}: {self.model.m} constraint rows"
