@@ -15,7 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbref.ensembles.candidates import Candidates, Parameters, candidates_of
+from mbref.ensembles.candidates import Candidates, candidates_of
+from mbref.equations.evaluated_together import Parameters
 from mbref.equations.initial_state import LARGE
 from mbref.equations.joint_reactions import lazy_reactions
 from mbref.equations.model import motion_of

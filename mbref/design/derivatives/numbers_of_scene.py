@@ -16,8 +16,8 @@ import numpy as np
 
 from mbref.design.derivatives.states import States, arrays_of_terms, shortest_spring, sum_of_differences
 from mbref.design.differences import Stencil, affine, central, one_sided
-from mbref.ensembles.candidates import Evaluations
-from mbref.equations.initial_state import consistent_start
+from mbref.equations.evaluated_together import Evaluations
+from mbref.equations.initial_state import Start, consistent_start
 from mbref.equations.model import Model, Terms, displacement
 from mbref.equations.offsets import assembled
 from mbref.equations.packing import Packs
@@ -213,22 +213,21 @@ def _differences(scene: Scene, label: str, step: float, stencil: Stencil, base: 
     """Return the number with variants at a step times the offsets of a stencil."""
     variants = Variants.of(scene, label, step, stencil, base)
     evaluations, start = Evaluations(base, variants.packs), consistent_start(base)
-    starts = evaluations.starts()
-    for each in starts:
-        if isinstance(each, SceneError):
-            raise each
-        if each.follows_branch or start.follows_branch:
-            raise InputError(
-                f"{label}: the motion starts at a singular position, where derivatives do not exist"
-            )
+    starts: list[Start] = []
+    for found in evaluations.starts():
+        if isinstance(found, SceneError):
+            raise found
+        starts.append(found)
+    if any(each.follows_branch for each in (start, *starts)):
+        raise InputError(f"{label}: the motion starts at a singular position, where derivatives do not exist")
     x = np.array([displacement(start.q, each.q) for each in starts])
     v = np.array([each.v for each in starts])
     arrays = x / base.units, v / base.units, *_arrays(variants.packs)
-    error = max(_stencil_error(each, stencil, step) for each in arrays)
-    for each in arrays_of_terms(_terms_at(evaluations.terms, range(len(starts)), _general_state(base))):
-        error = max(error, _stencil_error(each, stencil, step, TERMS_ROUNDING))
+    terms = _terms_at(evaluations.terms, range(len(starts)), _general_state(base))
+    errors = [_stencil_error(values, stencil, step) for values in arrays]
+    errors += [_stencil_error(values, stencil, step, TERMS_ROUNDING) for values in arrays_of_terms(terms)]
     weights = stencil.weights / step
-    return SceneNumber(label, variants, evaluations.terms, weights, weights @ x, weights @ v, error)
+    return SceneNumber(label, variants, evaluations.terms, weights, weights @ x, weights @ v, max(errors))
 
 
 def _stencil_error(values: np.ndarray, stencil: Stencil, step: float, allowed: float = 0.0) -> float:

@@ -142,11 +142,11 @@ def tangents_at(
     opened = rows.open(placed, -own[:, :m], noise)
     x = np.concatenate([basis, np.zeros_like(basis), placed], axis=2)
     changed = np.concatenate([np.zeros((k, len(own[0]), 2 * f)), own], axis=2)
-    for j in np.flatnonzero(x.any(axis=(0, 1))):
+    for j in np.flatnonzero(x.any(axis=(0, 1))).tolist():
         changed[..., j] += residuals.along(x[..., j] * units, step)
     v = rows.placed(-changed[:, m : 2 * m])
     v[..., f : 2 * f] = basis
-    for j in np.flatnonzero(v.any(axis=(0, 1))):
+    for j in np.flatnonzero(v.any(axis=(0, 1))).tolist():
         changed[..., j] += residuals.by_velocity(v[..., j] * units)
     a, multipliers = rows.solve(-changed[:, 2 * m : 3 * m], -changed[:, 3 * m :])
     return Tangents(x, v, a, multipliers, opened)
