@@ -16,8 +16,7 @@ from crosscheck.findings.finding import Finding, Status
 TEXTS: dict[str, Any] = dict.fromkeys(("name", "engine", "version", "does", "right", "cause"), "a")
 PARENT = """
 from crosscheck.findings.finding import Finding
-from tests.doors.commands.test_proofs_of_findings import TEXTS
-Finding(**TEXTS, package="numpy", script={script!r}).recheck()
+Finding(**{texts!r}, package="numpy", script={script!r}).recheck()
 """
 SLEEPER = "import os, pathlib, time; pathlib.Path({path!r}).write_text(str(os.getpid())); time.sleep(600)"
 PATIENCE = 60.0  # s of waiting, on a loaded machine
@@ -65,7 +64,9 @@ def test_script_of_a_proof_ends_when_the_command_that_runs_it_is_killed(tmp_path
     loaded machine, the script's process has ended, too."""
     pid_file = tmp_path / "number"
     script = SLEEPER.format(path=str(pid_file))
-    parent = subprocess.Popen([sys.executable, "-c", PARENT.format(script=script)], cwd=os.getcwd())
+    parent = subprocess.Popen(
+        [sys.executable, "-c", PARENT.format(texts=TEXTS, script=script)], cwd=os.getcwd()
+    )
     number = int(wait_for(lambda: pid_file.exists() and pid_file.read_text()))
     parent.send_signal(signal.SIGKILL)
     parent.wait()
