@@ -83,7 +83,7 @@ def _parsed(path: str | Path | None, text: bytes) -> tuple[dict[str, dict[str, A
     lines = [_record(line) for line in text[:end].splitlines()]
     foreign = [number for number, record in enumerate(lines, 1) if record is None]
     if text and len(foreign) == len(lines):
-        raise RecordsError(f"{path}: holds no records; name another file, or remove it")
+        raise RecordsError(f"{path}: holds no records; name another file")
     if foreign:
         numbers = ", ".join(map(str, foreign))
         print(f"{path}: line {numbers} holds no record and was left unchanged", file=sys.stderr)

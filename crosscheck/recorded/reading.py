@@ -117,6 +117,7 @@ def _chosen(
     """Return for each column of the scene the number of the table's column, and its unit if a unit is
     given."""
     known = ["time", *names(scene)]
+    columns = {_recognised(name, known)[0] or name: place for name, place in columns.items()}
     chosen: dict[str, int] = {}
     units: dict[str, str] = {}
     for k, header in enumerate(headers):

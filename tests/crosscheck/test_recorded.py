@@ -146,7 +146,7 @@ def test_tables_in_other_units_and_orders_are_judged_right(table, tmp_path):
     rows = zip(TIMES * 1e3, x, angle, strict=True)
     text = "\n".join(" ".join(f"{v:.9f}" for v in row) for row in rows)
     (tmp_path / "plain.txt").write_text("# exported\n" + text)
-    columns = {"time": "1:ms", "lower.position.x": "2", "A.angle": "3"}
+    columns = {"T": "1:ms", "lower.x": "2", "A.angle": "3"}
     found = read(tmp_path / "plain.txt", SCENE, columns, units=["mm", "deg"])
     assert judge_motion(SCENE, found).is_right
     rows = zip(TIMES, x, angle, strict=True)
