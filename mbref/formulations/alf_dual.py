@@ -65,8 +65,7 @@ STRONGER, LARGEST_ALPHA = 1e3, 1e16
 # ratio of successive changes of dependent rows, above which conjugate directions continue the iteration
 SLOW = 0.2
 INFINITE = 1e300  # α that stands for a matrix without 1/α
-# squared pivots: of clearly independent rows, and above which one iteration suffices
-INDEPENDENT_ROWS, WIDE = 1e-4, 0.08
+INDEPENDENT_ROWS = 1e-4  # squared pivot of clearly independent rows
 SETTLED = 1e-14  # relative change of accelerations that ends the iteration
 # the largest α with which the matrix of redundant rows is positive definite in double precision
 REDUNDANT_ALPHA = 1e15
@@ -85,10 +84,10 @@ def accelerate(system):
 def solve_exactly(system):
     """Solve for independent rows, without 1/α; return False if they are not clearly independent.
 
-    Rows that are less clearly independent need a second iteration, which removes the rounding errors of the
-    first iteration, unless its change of M^(1/2) q̈, √(rᵀ S⁻¹ r) with the residual r, is small compared with
-    M^(1/2) q̈ and M^(1/2) q̈_0: at high speeds accelerations along the rows exceed the accelerations that
-    forces cause.
+    Rows with squared pivots below ``Settings.clear_pivot`` need a second iteration, which removes the
+    rounding errors of the first iteration. It is left out if its change of M^(1/2) q̈, √(rᵀ S⁻¹ r) with the
+    residual r, is small compared with M^(1/2) q̈ and M^(1/2) q̈_0: at high speeds accelerations along the rows
+    exceed the accelerations that forces cause.
     """
     factor = factor_of(system.scratch)
     row, step = factor.symbolic.row, factor.step
@@ -103,7 +102,7 @@ def solve_exactly(system):
         if row[i] != LINK:
             system.multipliers[row[i]] = -step[i]
     size = put_accelerations(system)
-    if not pivot > WIDE:
+    if not pivot > system.settings.clear_pivot:
         put_residual(factor.change, system)
         size = min(size, square_of_forces(system))
         if not substitute_forward(factor, step) <= SETTLED * SETTLED * size:

@@ -56,6 +56,8 @@ class Settings(NamedTuple):
     newton_tolerance: float = 1e-13
     rounding: float = 1e-15  # violation of positions below which they are not corrected
     independent: int = 0  # 1 if rows with small singular values are known to be independent
+    # squared pivot of unit rows above which one solution for the accelerations suffices, without refinement
+    clear_pivot: float = 0.08
     nearly_dependent: int = 0  # 1 if rows are nearly dependent at the start, as with two tilted hinges
 
 
@@ -135,14 +137,14 @@ class Symbolic(NamedTuple):
     d_start: Annotated[Unsigned, "r + 1"]  # first entry of each row of D = Φ_q M^(-1/2)
     d_entry: Annotated[Unsigned, "nd"]  # index of each entry of D in the constraint Jacobian
     d_column: Annotated[Unsigned, "nd"]
-    s_start: Annotated[Unsigned, "nl + 1"]  # first product in S of each entry of L
+    s_entry: Annotated[Unsigned, "products"]  # place in L of the number of S to which each product is added
     s_left: Annotated[Unsigned, "products"]  # the products: two numbers of D
     s_right: Annotated[Unsigned, "products"]
     l_start: Annotated[Unsigned, "r + 1"]  # first entry of each column of L, its diagonal element
     l_row: Annotated[Unsigned, "nl"]
-    update_start: Annotated[Unsigned, "nl + 1"]  # first update of each entry of L
-    update_left: Annotated[Unsigned, "updates"]  # factors of an update: entries of L and L Δ
-    update_right: Annotated[Unsigned, "updates"]
+    # first column of each panel: a column of L, or two neighbours with the same rows below both
+    panel: Annotated[Unsigned, "panels + 1"]
+    update: Annotated[Unsigned, "updates"]  # entry of L that each pair of rows below a panel changes
 
 
 class SparseFactor(NamedTuple):

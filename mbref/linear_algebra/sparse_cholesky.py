@@ -2,16 +2,18 @@
 
 α weighs rows of unit length, S_ii = 1, so that S_ii (1 + 1/α) stands on the diagonal; a row without entries
 has 1 on the diagonal and changes nothing. Rows that link copies of a body (``linear_algebra.hubs``) have no
-1/α.  Vectors of rows and columns are in the order of
-``SparseFactor.symbolic``.
+1/α.  Vectors of rows and columns are in the order of ``SparseFactor.symbolic``. Rows of one joint often have
+equal patterns, so that pairs of columns of L form panels.
 """
 
 from __future__ import annotations
 
-from numpy import sqrt
+from numpy import sqrt, uint64
 
 from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.layout import LINK
+
+NONE, ONE = uint64(0), uint64(1)  # sums with indices stay unsigned: compiled code tests signed indices
 
 
 @inlined
@@ -37,24 +39,13 @@ def of_row(vector, row):
 
 
 @inlined
-def product_of_rows(factor, entry):
-    """Return the entry of S at the place of an entry of L: the inner product of two rows of D."""
-    symbolic, d, value = factor.symbolic, factor.d, 0.0
-    start, left, right = symbolic.s_start, symbolic.s_left, symbolic.s_right
-    for p in range(start[entry], start[entry + 1]):
-        value += d[left[p]] * d[right[p]]
-    return value
-
-
-@inlined
-def eliminate(value, factor, entry):
-    """Subtract from a number of S + I/α the products of numbers of L in its row and column, from earlier
-    columns."""
-    symbolic, l, scaled = factor.symbolic, factor.l, factor.scaled
-    start, left, right = symbolic.update_start, symbolic.update_left, symbolic.update_right
-    for p in range(start[entry], start[entry + 1]):
-        value -= l[left[p]] * scaled[right[p]]
-    return value
+def add_products(factor):
+    """Compute the numbers of S, the inner products of the rows of D, at their places in L."""
+    symbolic, d, l = factor.symbolic, factor.d, factor.l
+    entry, left, right = symbolic.s_entry, symbolic.s_left, symbolic.s_right
+    l[:] = 0.0
+    for p in range(entry.shape[0]):
+        l[entry[p]] += d[left[p]] * d[right[p]]
 
 
 @kernel
@@ -68,31 +59,91 @@ def square_without_copies(factor, k):
 
 
 @inlined
-def factorise(factor, alpha, b):
-    """Compute L of S + I/α, with 1/Δ instead of its unit diagonal, and b := L⁻¹ b; return False if an entry
-    of Δ is ≤ 0.
-
-    Every number is computed at once from its products, and b while the next column waits for its pivot.
-    """
-    first, row, l = factor.symbolic.l_start, factor.symbolic.l_row, factor.l
+def regularise(factor, alpha):
+    """Add 1/α to the diagonal of S, which stands in L."""
+    first, l, diagonal = factor.symbolic.l_start, factor.l, factor.diagonal
     has_copies = factor.symbolic.link.shape[0] > 0
-    for k in range(first.shape[0] - 1):
-        start, value = first[k], product_of_rows(factor, first[k])
+    for k in range(diagonal.shape[0]):
+        value = l[first[k]]
         if has_copies:
             value += square_without_copies(factor, k) / alpha
         else:
             value *= 1.0 + 1.0 / alpha
-        factor.diagonal[k] = value if value > 0.0 else 1.0
-        pivot = eliminate(factor.diagonal[k], factor, start)
-        if not pivot > 0.0:
+        diagonal[k] = value if value > 0.0 else 1.0
+        l[first[k]] = diagonal[k]
+
+
+@inlined
+def divide_column(k, factor, b):
+    """Divide column k of L by its pivot, and subtract its products with b_k from later numbers of b; return
+    False if the pivot is ≤ 0."""
+    first, row, l, scaled = factor.symbolic.l_start, factor.symbolic.l_row, factor.l, factor.scaled
+    start = first[k]
+    if not l[start] > 0.0:
+        return False
+    inverse, found = 1.0 / l[start], b[k]
+    l[start] = inverse
+    for p in range(start + ONE, first[k + ONE]):
+        value = l[p]
+        scaled[p] = value
+        l[p] = value * inverse
+        b[row[p]] -= l[p] * found
+    return True
+
+
+@inlined
+def subtract_from_neighbour(k, factor):
+    """Subtract the products of column k of L from the next column, which has the same rows."""
+    first, l, scaled = factor.symbolic.l_start, factor.l, factor.scaled
+    start, end = first[k + ONE], first[k + ONE + ONE]
+    apart = start - first[k] - ONE
+    weight = l[start - apart]
+    for p in range(start, end):
+        l[p] -= weight * scaled[p - apart]
+
+
+@inlined
+def subtract_products(k, has_two, place, factor):
+    """Subtract the products of the last column k of a panel, and of the column before it if the panel
+    ``has_two``, from later columns of L; return the first place in ``symbolic.update`` of the next panel."""
+    first, update, l, scaled = factor.symbolic.l_start, factor.symbolic.update, factor.l, factor.scaled
+    start, end = first[k] + ONE, first[k + ONE]
+    if has_two:
+        apart = first[k] - first[k - ONE] - ONE
+        for j in range(start, end):
+            one, other = scaled[j - apart], scaled[j]
+            for i in range(j, end):
+                l[update[place]] -= l[i - apart] * one + l[i] * other
+                place = place + ONE
+    else:
+        for j in range(start, end):
+            one = scaled[j]
+            for i in range(j, end):
+                l[update[place]] -= l[i] * one
+                place = place + ONE
+    return place
+
+
+@inlined
+def factorise(factor, alpha, b):
+    """Compute L of S + I/α, with 1/Δ instead of its unit diagonal, and b := L⁻¹ b; return False if an entry
+    of Δ is ≤ 0.
+
+    A panel of two columns changes each later number of L once instead of twice.
+    """
+    add_products(factor)
+    regularise(factor, alpha)
+    panel, place = factor.symbolic.panel, NONE
+    for c in range(panel.shape[0] - 1):
+        last = panel[c + 1] - ONE
+        has_two = last > panel[c]
+        if has_two:
+            if not divide_column(last - ONE, factor, b):
+                return False
+            subtract_from_neighbour(last - ONE, factor)
+        if not divide_column(last, factor, b):
             return False
-        inverse, found = 1.0 / pivot, b[k]
-        l[start] = inverse
-        for p in range(start + 1, first[k + 1]):
-            value = eliminate(product_of_rows(factor, p), factor, p)
-            factor.scaled[p] = value
-            l[p] = value * inverse
-            b[row[p]] -= l[p] * found
+        place = subtract_products(last, has_two, place, factor)
     return True
 
 

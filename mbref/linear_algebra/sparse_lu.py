@@ -7,8 +7,8 @@ D.
 
 from __future__ import annotations
 
-from mbref.kernels.compilation import kernel
-from mbref.linear_algebra.sparse_cholesky import product_of_rows
+from mbref.kernels.compilation import inlined, kernel
+from mbref.linear_algebra.sparse_cholesky import NONE, ONE
 
 
 @kernel
@@ -19,31 +19,65 @@ def factorise_product(factor, other, alpha, product):
     ``product.lower`` (nl,) contains L without the ones on its diagonal, ``product.upper`` the entries of Uᵀ.
     The pivots (r,) are relative to the diagonal of D Dᵀ.
     """
-    first, lower, upper, pivots = factor.symbolic.l_start, product.lower, product.upper, product.pivots
-    for k in range(pivots.shape[0]):
-        start, square = first[k], product_of_rows(factor, first[k])
-        square = square if square > 0.0 else 1.0  # a row without entries
-        value, _ = eliminated(factor, other, product, start)
-        pivot = value + square / alpha
-        pivots[k] = pivot / square
-        inverse = 1.0 / pivot if pivot != 0.0 else alpha / square
-        for p in range(start + 1, first[k + 1]):
-            below, right = eliminated(factor, other, product, p)
-            lower[p], upper[p] = below * inverse, right
+    panel, before = factor.symbolic.panel, NONE
+    add_products_of(factor, other, product)
+    for c in range(panel.shape[0] - 1):
+        begin, end, place = panel[c] + NONE, panel[c + 1] + NONE, before
+        for k in range(begin, end):
+            divide_column(k, factor, alpha, product)
+            if k + ONE < end:
+                subtract_from_neighbour(k, factor, product)
+        for k in range(begin, end):
+            place = subtract_products(k, end, before, factor, product)
+        before = place
 
 
-@kernel
-def eliminated(factor, other, product, place):
-    """Return the numbers of D D̃ᵀ below and right of the diagonal at a place of the Cholesky factor, minus
-    products of earlier columns of L and U."""
+@inlined
+def add_products_of(factor, other, product):
+    """Compute the numbers of D D̃ᵀ below and right of the diagonal, at their places in the factor."""
     symbolic, d, lower, upper = factor.symbolic, factor.d, product.lower, product.upper
-    below, right = 0.0, 0.0
-    for p in range(symbolic.s_start[place], symbolic.s_start[place + 1]):
-        i, j = symbolic.s_left[p], symbolic.s_right[p]
-        below += d[i] * other[j]
-        right += d[j] * other[i]
-    for p in range(symbolic.update_start[place], symbolic.update_start[place + 1]):
-        i, j = symbolic.update_left[p], symbolic.update_right[p]
-        below -= lower[j] * upper[i]
-        right -= lower[i] * upper[j]
-    return below, right
+    entry, left, right = symbolic.s_entry, symbolic.s_left, symbolic.s_right
+    lower[:], upper[:] = 0.0, 0.0
+    for p in range(entry.shape[0]):
+        lower[entry[p]] += d[left[p]] * other[right[p]]
+        upper[entry[p]] += d[right[p]] * other[left[p]]
+
+
+@inlined
+def divide_column(k, factor, alpha, product):
+    """Compute pivot k, and divide column k of L by the pivot."""
+    first, start, d, square = factor.symbolic.l_start, factor.symbolic.d_start, factor.d, 0.0
+    for p in range(start[k], start[k + ONE]):
+        square += d[p] * d[p]
+    square = square if square > 0.0 else 1.0  # a row without entries
+    pivot = product.lower[first[k]] + square / alpha
+    product.pivots[k] = pivot / square
+    inverse = 1.0 / pivot if pivot != 0.0 else alpha / square
+    for p in range(first[k] + ONE, first[k + ONE]):
+        product.lower[p] *= inverse
+
+
+@inlined
+def subtract_from_neighbour(k, factor, product):
+    """Subtract the products of column k of L and row k of U from the next ones, which have equal places."""
+    first, lower, upper = factor.symbolic.l_start, product.lower, product.upper
+    start, end = first[k + ONE], first[k + ONE + ONE]
+    apart = start - first[k] - ONE
+    below, right = lower[start - apart], upper[start - apart]
+    for p in range(start, end):
+        lower[p] -= lower[p - apart] * right
+        upper[p] -= upper[p - apart] * below
+
+
+@inlined
+def subtract_products(k, end, place, factor, product):
+    """Subtract the products of column k of L and row k of U from the numbers behind the panel, which ends
+    before column ``end``; return the first place in ``symbolic.update`` of the next panel."""
+    first, update = factor.symbolic.l_start, factor.symbolic.update
+    lower, upper = product.lower, product.upper
+    for j in range(first[k] + (end - k), first[k + ONE]):
+        for i in range(j, first[k + ONE]):
+            lower[update[place]] -= lower[i] * upper[j]
+            upper[update[place]] -= lower[j] * upper[i]
+            place = place + ONE
+    return place

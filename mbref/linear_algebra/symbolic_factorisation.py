@@ -53,14 +53,21 @@ def _of_pattern(*pattern: bytes) -> Symbolic:
     path = CACHE / "patterns" / digest.hexdigest()[:32]
     data = checked_file.read(path)
     if data is None:
-        symbolic = _made(*pattern)
+        symbolic = _unchangeable(_made(*pattern))
         sizes = np.array([array.size for array in symbolic], dtype=np.int64)
         if 4 * sizes.sum() <= MOST_STORED:
             checked_file.write(path, sizes.tobytes() + b"".join(array.tobytes() for array in symbolic))
         return symbolic
     count = len(Symbolic._fields)
     sizes, indices = np.frombuffer(data, np.int64, count), np.frombuffer(data, np.uint32, offset=8 * count)
-    return Symbolic(*np.split(indices.copy(), np.cumsum(sizes)[:-1]))
+    return _unchangeable(Symbolic(*np.split(indices.copy(), np.cumsum(sizes)[:-1])))
+
+
+def _unchangeable(symbolic: Symbolic) -> Symbolic:
+    """Return a pattern whose arrays are read-only, so that reused memory of kernels does not restore them."""
+    for array in symbolic:
+        array.flags.writeable = False
+    return symbolic
 
 
 def _made(*given: bytes) -> Symbolic:
@@ -80,9 +87,8 @@ def _made(*given: bytes) -> Symbolic:
     place[order] = np.arange(order.size)
     row, column, entry = _sorted_by(place[row], column, entry)
     l_key = np.repeat(np.arange(order.size), np.diff(l_start)) * order.size + l_row
-    target, left, right = _products(row, column, l_key, order.size)
-    changed, update_left, update_right = _updates(l_start, l_row, l_key, order.size)
-    numbers = np.arange(l_row.size + 1)
+    entry_of_s, left, right = _products(row, column, l_key, order.size)
+    panel = _panels(l_start, l_row)
     of_system = np.append(kept, np.full(rows - kept.size, LINK))
     return Symbolic(
         row=unsigned(of_system[order]),
@@ -91,14 +97,13 @@ def _made(*given: bytes) -> Symbolic:
         d_start=unsigned(np.searchsorted(row, np.arange(order.size + 1))),
         d_entry=unsigned(entry),
         d_column=unsigned(column),
-        s_start=unsigned(np.searchsorted(target, numbers)),
+        s_entry=unsigned(entry_of_s),
         s_left=unsigned(left),
         s_right=unsigned(right),
         l_start=unsigned(l_start),
         l_row=unsigned(l_row),
-        update_start=unsigned(np.searchsorted(changed, numbers)),
-        update_left=unsigned(update_left),
-        update_right=unsigned(update_right),
+        panel=unsigned(panel),
+        update=unsigned(_updates(panel, l_start, l_row, l_key)),
     )
 
 
@@ -192,29 +197,34 @@ def _sorted_by(key: np.ndarray, *others: np.ndarray) -> list[np.ndarray]:
 def _products(
     row: np.ndarray, column: np.ndarray, l_key: np.ndarray, size: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return sorted index triples: two numbers of D in one column, and the place in L of the number of S to
-    which their product is added."""
+    """Return index triples: the place in L of a number of S, and two numbers of D in one column, whose
+    product is added to that number. Neighbours are added to different numbers, so that none waits."""
     by_column, pairs = np.argsort(column, kind="stable"), []
     for group in np.split(by_column, np.flatnonzero(np.diff(column[by_column])) + 1):
         first, second = np.tril_indices(group.size)
         pairs.append((group[first], group[second]))
     left, right = (np.concatenate(side) for side in zip(*pairs, strict=True))
-    target = np.searchsorted(l_key, row[right] * size + row[left])
-    target, left, right = _sorted_by(target, left, right)
-    return target, left, right
+    return np.searchsorted(l_key, row[right] * size + row[left]), left, right
 
 
-def _updates(
-    l_start: np.ndarray, l_row: np.ndarray, l_key: np.ndarray, size: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return sorted index triples of the updates L[target] −= L[left] · LΔ[right], early columns first."""
-    nothing = np.zeros(0, dtype=np.int64)
-    keys, pairs = [nothing], [(nothing, nothing)]
-    for k in range(size):
-        below = np.arange(l_start[k] + 1, l_start[k + 1])
+def _panels(l_start: np.ndarray, l_row: np.ndarray) -> np.ndarray:
+    """Return the first column of each panel, and the number of columns: two neighbours are a panel if the
+    first one has an entry in the row of the second one, and no other row more."""
+    count = np.diff(l_start)
+    follows = l_row[np.minimum(l_start[:-1] + 1, l_row.size - 1)] == np.arange(1, count.size + 1)
+    pairs = (follows[:-1] & (count[:-1] == count[1:] + 1)).tolist()
+    firsts = [0]
+    while firsts[-1] < count.size:
+        k = firsts[-1]
+        firsts.append(k + 2 if k < len(pairs) and pairs[k] else k + 1)
+    return np.array(firsts, dtype=np.int64)
+
+
+def _updates(panel: np.ndarray, l_start: np.ndarray, l_row: np.ndarray, l_key: np.ndarray) -> np.ndarray:
+    """Return the place in L of each pair of rows below a panel: columns of the first row, panel by panel."""
+    size, places = l_start.size - 1, [np.zeros(0, dtype=np.int64)]
+    for last in panel[1:] - 1:
+        below = l_row[l_start[last] + 1 : l_start[last + 1]]
         first, second = np.triu_indices(below.size)
-        keys.append(l_row[below[first]] * size + l_row[below[second]])
-        pairs.append((below[first], below[second]))
-    left, right = (np.concatenate(side) for side in zip(*pairs, strict=True))
-    target, left, right = _sorted_by(np.searchsorted(l_key, np.concatenate(keys)), left, right)
-    return target, left, right
+        places.append(np.searchsorted(l_key, below[first] * size + below[second]))
+    return np.concatenate(places)

@@ -38,6 +38,9 @@ BENT = 1e-6  # last correction / distance from a singular position, below which 
 MOVED = 30.0  # last correction in roundings, above which rows and factor are computed again
 # rad; so that two bodies turn by less than a right angle, at which gradients would be opposite
 LARGEST_TURN = 0.75
+# squared pivot × tolerance of a step above which accelerations are solved for once: their rounding, about
+# 1e-15 over the squared pivot, is then a thousandth of the tolerance
+ROUNDED = 1e-12
 FACTOR_FAILED = -1.0  # returned by a Newton step instead of the violation
 
 
@@ -218,7 +221,8 @@ def rates(t, y, y_rate, memory):
     expand(y, memory.active, state)
     assemble_system(t, state.coordinates, state.velocities, equations)
     settings, some = equations.system.settings, depend_on_others(memory)
-    independent = settings.independent
+    independent, clear = settings.independent, settings.clear_pivot
+    settings.clear_pivot = min(clear, pivot_by_tolerance(memory))
     if some:
         leave_out_dependent_rows(memory)
         settings.independent = 1
@@ -226,8 +230,20 @@ def rates(t, y, y_rate, memory):
     if some:
         put_back_dependent_rows(memory)
         settings.independent = independent
+    settings.clear_pivot = clear
     write_rates(y_rate, memory)
     return status
+
+
+@inlined
+def pivot_by_tolerance(memory):
+    """Return the squared pivot above which rounding of accelerations is far below the tolerance of a step; 1
+    if steps have a fixed length instead of a tolerance."""
+    control = memory.control
+    if control.fixed_step > 0.0:
+        return 1.0
+    tolerance = memory.loop.clock.share * min(control.rtol, control.atol)
+    return ROUNDED / max(tolerance, ROUNDED)
 
 
 @kernel

@@ -102,14 +102,15 @@ def test_velocities_across_the_plane_decay_to_zero_instead_of_denormals(formulat
 
 
 def test_shares_of_redundant_rows_are_squares_of_left_null_vectors():
-    """Two of six unit rows depend on others; NumPy's singular vectors give the null space. Shares agree to
-    √rounding, as the squared matrix is factorised. The last row is independent: its share is zero."""
-    rounding = 1e-12
+    """Two of six unit rows depend on others; NumPy's singular vectors give the null space. The squared matrix
+    is factorised with 1/α = 1e-10 on its diagonal, which carries the rounding of up to six products. The last
+    row is independent: its share is zero."""
+    rounding = 6 * np.finfo(float).eps / 1e-10
     matrix = np.random.default_rng(7).normal(size=(6, 9))
     matrix[2], matrix[4] = 2.0 * matrix[0], matrix[1] - matrix[3]
     matrix /= np.linalg.norm(matrix, axis=1)[:, None]
     left, _, _ = np.linalg.svd(matrix)
     found = Redundancy(csr_array(matrix))
     assert found.rank == 4
-    np.testing.assert_allclose(found.shares, np.sum(left[:, 4:] ** 2, axis=1), atol=np.sqrt(rounding))
-    assert found.shares[5] < rounding
+    np.testing.assert_allclose(found.shares, np.sum(left[:, 4:] ** 2, axis=1), atol=rounding)
+    assert found.shares[5] < 1e-12
