@@ -80,6 +80,14 @@ def applied_multiplier(k, lane, slopes, terms):
     return before, now
 
 
+@inlined
+def resistance(k, s, q, loads, factors):
+    """Return order k of stiffness (q - natural) + damping q' - force of load s along a joint coordinate q."""
+    moved = q[k] - loads.natural[s] if k == 0 else q[k]
+    resisting = loads.stiffness[s] * moved + loads.damping[s] * (k + 1) * q[k + 1]
+    return resisting - applied_order(loads.amount[s], loads.function[s], k, factors)
+
+
 @kernel
 def add_torsions(k, memory):
     """Compute order k of the forces of loads about axes: (torque - stiffness (θ - natural) - damping θ') (C
@@ -87,9 +95,7 @@ def add_torsions(k, memory):
     torsions, sums, nz = memory.polynomials.torsions, memory.series.sums, memory.solver.pivot_columns.shape[0]
     for s in range(torsions.stiffness.shape[0]):
         of = memory.series.torsions[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
-        angle = of[TORSION, k] - torsions.natural[s] if k == 0 else of[TORSION, k]
-        of[TORQUE, k] = torsions.stiffness[s] * angle + torsions.damping[s] * (k + 1) * of[TORSION, k + 1]
-        of[TORQUE, k] -= applied_order(torsions.amount[s], torsions.function[s], k, memory.series.factors)
+        of[TORQUE, k] = resistance(k, s, of[TORSION], torsions, memory.series.factors)
         if torsions.row[s] >= 0:
             add_coupled_angle(s, k, of, memory)
         of[TORQUE_COS, k] = product_order(of[TORQUE], of[COS], k)
@@ -162,9 +168,7 @@ def add_slides(k, memory):
     slides, sums, nz = memory.polynomials.slides, memory.series.sums, memory.solver.pivot_columns.shape[0]
     for s in range(slides.stiffness.shape[0]):
         of = memory.series.slides[SLIDE_SERIES * s : SLIDE_SERIES * (s + 1)]
-        along = of[SLID, k] - slides.natural[s] if k == 0 else of[SLID, k]
-        of[PUSH, k] = slides.stiffness[s] * along + slides.damping[s] * (k + 1) * of[SLID, k + 1]
-        of[PUSH, k] -= applied_order(slides.amount[s], slides.function[s], k, memory.series.factors)
+        of[PUSH, k] = resistance(k, s, of[SLID], slides, memory.series.factors)
         if slides.row[s] >= 0:
             add_coupled_displacement(s, k, of, memory)
         for c in range(3):
