@@ -59,7 +59,8 @@ class ConstraintRows:
             return found
         rows = terms.jacobian * self.model.units
         lengths = row_lengths(rows)
-        left, values, right = np.linalg.svd(rows / lengths[:, None])
+        few = rows.shape[0] < rows.shape[1]  # then the null space needs all right singular vectors
+        left, values, right = np.linalg.svd(rows / lengths[:, None], full_matrices=few)
         rank = int(np.sum(values > TANGENT_RANK * values.max(initial=0.0)))
         bound = right[:rank].T @ (left[:, :rank].T @ (terms.gamma / lengths) / values[:rank])
         return Allowed(bound, right[rank:].T, float(values[rank - 1] / values[0]) if rank else 1.0)

@@ -39,13 +39,15 @@ def placed_with_springs(model: Model, q: np.ndarray, angles: Mapping[str, float]
     ``angles`` (rad) of joints, by name, may be more than half a turn.
     """
     found, turned = placed(model, q), angles or {}
-    loads = [_with_natural_value(model, q, load, turned) for load in found.load]
-    couplings = [
+    loads = tuple(_with_natural_value(model, q, load, turned) for load in found.load)
+    couplings = tuple(
         each
         if each.powers == 1
         else each.from_pose(_coordinate(model, q, *model.scene.coupled(each)[0], turned))
         for each in found.coupling
-    ]
+    )
+    if loads == found.load and couplings == found.coupling:
+        return found
     return found.with_(load=loads, coupling=couplings)
 
 
@@ -77,11 +79,15 @@ def _displacement(model: Model, q: np.ndarray, joint: Joint) -> float:
 
 def _moved_geometry(model: Model, joint: Joint, q: np.ndarray) -> dict[str, Any]:
     """Return the geometric fields of a joint at coordinates q."""
-    ends = tuple(place(model, *end, q) for end in zip(joint.bodies, joint.anchor_pair, strict=True))
+    ends = [*zip(joint.bodies, joint.anchor_pair, strict=True)]
     carried = zip(joint.bodies, joint.directions * 2, strict=False)
     axes = tuple(_rounded(_direction(model, *each, q)) for each in carried)
-    every: dict[str, Any] = {"anchor": ends[1], "anchors": ends, "axis": axes[:1] and axes[0], "axes": axes}
-    return {key: value for key, value in every.items() if key in type(joint).model_fields}
+    found: dict[str, Any] = {"axis": axes[:1] and axes[0], "axes": axes}
+    if "anchors" in type(joint).model_fields:
+        found["anchors"] = tuple(place(model, *end, q) for end in ends)
+    else:
+        found["anchor"] = place(model, *ends[1], q)
+    return {key: value for key, value in found.items() if key in type(joint).model_fields}
 
 
 def _moved_points(model: Model, load: Any, q: np.ndarray) -> dict[str, Any]:
