@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -70,12 +69,12 @@ def candidates_of(run: Run, scenes: Sequence[Scene]) -> Candidates:
 def _starts(
     run: Run, packs: Packs, evaluations: Evaluations
 ) -> tuple[dict[int, Start], np.ndarray, np.ndarray]:
-    """Return the consistent starts as ``Run`` computes them, by scene index, and coordinates (s, 7 nb) and
-    velocities (s, 6 nb) of all scenes."""
+    """Return the consistent starts by scene index, and coordinates (s, 7 nb) and velocities (s, 6 nb) of all
+    scenes, in which roundings of zero are zero, as in ``Run``."""
     q, v = packs.start(), np.zeros_like(packs.mass)
     found = {k: start for k, start in enumerate(evaluations.starts()) if isinstance(start, Start)}
     if found:
         places, starts = [*found], found.values()
         at, rates, given = (np.array([getattr(s, name) for s in starts]) for name in ("q", "v", "given"))
         q[places], v[places] = without_rounding(at, rates, given, packs.length[places])
-    return {k: replace(start, q=q[k], v=v[k]) for k, start in found.items()}, q, v
+    return found, q, v
