@@ -4,7 +4,7 @@ import pytest
 
 from tests.fuzz import targets
 
-SHORT = range(1000, 1045)  # seeds
+SHORT = range(1000, 1030)  # seeds
 
 
 @pytest.mark.parametrize(("target", "count"), [("scene_file", 150), ("scene_data", 300)])
@@ -18,8 +18,8 @@ def test_mutated_scene_is_accepted_or_refused_with_a_scene_error(target, count, 
 
 
 def test_random_command_line_ends_with_a_documented_status_and_message(tmp_path, monkeypatch):
-    """Documented are the statuses 0, 1, 2 and 130. A traceback, or a file that is left behind, is a
-    defect."""
+    """SHORT has the seeds of 30 command lines. Documented are the statuses 0, 1, 2 and 130. A traceback, or a
+    file that is left behind, is a defect. More than 10 commands and statuses are met."""
     monkeypatch.chdir(tmp_path)
     cases = {seed: targets.case("command_line", seed) for seed in SHORT}
     assert not {seed: defect for seed, (_, defect) in cases.items() if defect}

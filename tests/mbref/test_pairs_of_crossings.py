@@ -35,8 +35,10 @@ def test_flat_positions_of_two_loops_within_one_step_are_both_recorded(apart, me
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("number", [1, 2])
 def test_second_branch_is_taken_at_the_first_or_second_of_two_crossings_in_a_step(number, method):
-    """Up to the crossing of its loop a coupler is parallel to its frame, to POSITION, 1e-9 rad; on the second
-    branch it turns, here by more than 0.1 rad. Gravity and rigid joints lose no energy, to 100 rtol."""
+    """The rocker of one loop is the crank of the next. Body 1 is the coupler of the first loop, whose frame
+    is at 0 rad, body 3 that of the second, whose frame is at -0.02 rad. Up to the crossing of its loop a
+    coupler is parallel to its frame, to POSITION, 1e-9 rad; on the second branch it turns by more than 0.1
+    rad. Gravity and rigid joints lose no energy, to 100 rtol."""
     apart, times, rtol = -2e-2, np.linspace(0.0, 0.6, 61), 1e-9
     limits = Limits(rtol=rtol, branches={number: 2}, code="generic")
     run = simulate(two_rhombi(apart), method, times, limits)

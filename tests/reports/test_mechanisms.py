@@ -55,7 +55,8 @@ def test_still_picture_shows_the_largest_difference_of_a_run():
 
 
 def test_crank_turns_by_less_than_two_thirds_of_a_radian_between_drawn_frames():
-    """Frames are chosen so that a body turns by about 0.35 rad between them, and are at most 91."""
+    """Frames are chosen so that a body turns by about 1/3 rad between them; a turn of twice that would look
+    broken. At most 91 frames are drawn."""
     planar = SCENES["planar_slider_crank"]().with_(duration=0.05)
     true = mechanisms.motion_of(planar, truth_record(planar, np.linspace(0, 0.05, 3), 20.0)["motion"])
     crank, *_ = bars(mechanisms.over_truth(planar, true, None, ""), BACKGROUND)
