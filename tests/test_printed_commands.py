@@ -65,7 +65,8 @@ OTHERS = [
 
 @pytest.mark.parametrize("page", ["README.md", *map(slow, OTHERS)])
 def test_printed_commands_of_mbref_end_with_status_0(page, tmp_path):
-    """In the page's order, in one folder that has my.toml; test_transcripts.py compares outputs."""
+    """Commands of a page run in its order, in one folder. Its my.toml is the template of `mbref new`, or the
+    scene that OWN names; README makes its own. test_transcripts.py compares outputs."""
     if page in OWN:
         SCENES[OWN[page]]().save(tmp_path / "my.toml")
     elif page != "README.md":

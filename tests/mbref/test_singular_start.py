@@ -108,9 +108,9 @@ def test_slow_start_against_the_weight_is_undecided_at_its_singular_position():
 
 
 def test_message_of_an_undecided_run_also_states_the_branch_at_its_start():
-    """Released at rest in the flat position, the parallelogram swings through half a turn and comes to rest
-    in the other flat position, after more than 0.1 s. There neither a tighter tolerance nor another branch
-    helps."""
+    """Released at rest in the flat position, the parallelogram swings through half a turn, under its weight,
+    and comes to rest in the other flat position, after more than 0.1 s. There neither a tighter tolerance nor
+    another branch helps."""
     run = simulate(falling_parallelogram(0.0), "taylor", np.linspace(0.0, 1.0, 9))
     assert run.outcome.name == "UNDECIDED" and run.t_end > 0.1
     cause, advice, start = run.message.split("; ")
@@ -123,7 +123,7 @@ def test_message_of_an_undecided_run_also_states_the_branch_at_its_start():
 
 
 def test_branches_of_a_start_at_rest_are_listed_without_velocities():
-    """Projection ends at the start, where two branches meet; nothing moves."""
+    """A parallelogram starts flat, at rest, where two branches meet. The run by projection ends there."""
     [met] = simulate(falling_parallelogram(0.0), "mpi-svd+projection", [0.0, 0.1]).crossings
     assert met.sentence == "2 branches" and not np.any(met.angular_velocity)
 

@@ -93,7 +93,7 @@ def cells(table: Table) -> list[dict[str, str]]:
 
 
 def test_score_counts_the_three_changed_cells(records):
-    """Two of them end at another time, one with another outcome."""
+    """Of the ``records`` two end at another time than printed, one with another outcome."""
     score = paper.score(records)
     assert f"Of {len(CELLS)} cells" in score and f"{len(CELLS) - 3} have" in score, score
     assert "2 the outcome at another time, 1 another outcome" in score, score
@@ -108,8 +108,9 @@ def test_score_counts_cells_that_end_as_printed_in_most_draws_and_in_any(records
 
 
 def test_changed_cells_are_listed_with_their_causes(blocks):
-    """0.0566 s is the next singular position; 1 of 20 random starts ends as printed; the five-bar's run
-    crosses every singular position; the violation of LM2 grows."""
+    """Three of the ``records`` differ from the paper: MPI (SVD) ends late, at 0.0566 s, the next singular
+    position (1 of its 20 random starts ends as printed); the five-bar completes and crosses every singular
+    position; the violation of LM2 grows to the limit at 2.5 s."""
     [found] = tables(blocks, "Measured")
     reasons = {(c["Table"], c["Column"], c["Method"]): c["Measured"] for c in cells(found)}
     assert len(reasons) == 3, reasons
