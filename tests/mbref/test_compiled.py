@@ -1,32 +1,9 @@
-"""Promises of the decorators of kernels."""
+"""Kernels are compiled before the clock of a run counts."""
 
-import numba
-import numpy as np
-import pytest
-
-from mbref.kernels.compilation import PLAIN, Entry, allocating, kernel
+from mbref.kernels.compilation import Entry
 from mbref.taylor.driven import follow_drivers
 from mbref.taylor.preparation import KERNELS_OF_SERIES
 from mbref.taylor.series_memory import CALLED
-
-
-@allocating
-def total(n):
-    return np.ones(n).sum()
-
-
-@kernel
-def greedy(n):
-    return np.ones(n).sum()
-
-
-@pytest.mark.skipif(PLAIN, reason="without the JIT kernels are plain functions")
-def test_array_is_allocated_only_by_a_kernel_with_the_decorator_allocating():
-    """``total`` and ``greedy`` both sum three ones. ``total`` has this decorator; ``greedy`` has ``kernel``,
-    and numba refuses to compile it."""
-    assert total(3) == 3.0
-    with pytest.raises(numba.core.errors.NumbaError, match="of array passed into"):
-        greedy(3)
 
 
 def test_every_kernel_that_a_series_calls_is_compiled_before_a_run():

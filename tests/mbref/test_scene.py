@@ -96,16 +96,6 @@ def test_fault_is_reported_once_under_its_path(path, value, reported):
     assert sum(fault.startswith(f"{reported}: ") for fault in faults) == 1, faults
 
 
-def test_nine_faults_of_one_scene_are_all_reported():
-    """FAULTS has a path in a right scene, a wrong value, and the path that is reported; of nine fields the
-    first wrong value is planted at once."""
-    fields = [(("body", 0, key)) for key in ("mass", "inertia", "orientation", "position", "colour")]
-    fields += [("joint", 0, "axis"), ("driver", 0, "polynomial"), ("load", 0, "body"), ("gravity",)]
-    nine = [next(fault for fault in FAULTS if fault[0] == field) for field in fields]
-    faults = faults_of(changed(*((path, value) for path, value, _ in nine)))
-    assert sorted(f.split(": ")[0] for f in faults) == sorted(r for _, _, r in nine), "\n".join(faults)
-
-
 @pytest.mark.parametrize("name", SCENES)
 def test_saved_scene_is_read_back_equal(name, tmp_path):
     """Each built-in scene, written as TOML and read again."""

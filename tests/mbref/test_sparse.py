@@ -6,9 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse import csr_array
 
-from mbref.equations import initial_state
-from mbref.equations.active_coordinates import active_entries
-from mbref.equations.model import Model
 from mbref.kernels.named_memory import packed
 from mbref.linear_algebra.redundancy import Redundancy
 from mbref.linear_algebra.sparse_cholesky import (
@@ -70,24 +67,6 @@ def test_sparse_factor_solves_multiplies_and_has_pivots_as_dense_matrices(bodies
     find_squared_pivots(memory)
     seen = np.sqrt(np.sort(factor.squared_pivots))
     assert np.abs(seen - pivots).max(initial=0) < 1e-6 / np.sqrt(alpha), f"pivots {seen}, dense {pivots}"
-
-
-@pytest.mark.parametrize(
-    ("name", "gravity", "rows"),
-    [
-        ("four_bar_chain[5]", (0.0, -9.81, 0.0), 6 * 5 + 2),  # two a joint: the motion is planar
-        ("four_bar_chain[5]", (0.0, -9.81, 1.0), 13 * 5 + 5),  # loaded out of the plane
-        ("planar_slider_crank", (0.0, 0.0, 0.0), 7),  # two at each hinge and at the ball, one at the slide
-        ("spatial_slider_crank", (0.0, 0.0, 0.0), 14),  # the slider and the line never turn: three rows rest
-    ],
-)
-def test_number_of_moving_rows_follows_from_the_plane_of_the_motion(name, gravity, rows):
-    """A row moves if one of its coordinates is not constant during the motion; comments of the cases count
-    such rows of each joint."""
-    model = Model(find_scene(name).with_(gravity=gravity))
-    start = initial_state.consistent_start(model)
-    moving = active_entries(model, start.q, start.v)[1].any(axis=1)
-    assert moving.sum() == rows, f"{moving.sum()} of {model.m} rows move"
 
 
 @pytest.mark.parametrize("formulation", ["alf-dual", "mpi-svd"])

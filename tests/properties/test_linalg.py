@@ -134,22 +134,6 @@ def test_least_norm_solution_by_qr_equals_numpys_least_squares_solution_by_svd(c
     assert error < RATIO * unit, f"relative difference {error:.1e}"
 
 
-@pytest.mark.parametrize("rows", [(0, 1, 2), (1, 0, 2), (2, 1, 0)])
-def test_least_norm_by_qr_chooses_the_longest_independent_rows(rows):
-    """Rows (1, 0, 0), (2, 0, 0) and (0.8, 0.6, 0), in some order: the longest one is chosen, then the last
-    one, of which 0.6 is left; (1, 0, 0) depends on the first. The solution of least norm has no third
-    component."""
-    d = np.array([[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.8, 0.6, 0.0]])[list(rows)]
-    scratch = allocate(mpi_qr.Scratch, {"m": 3, "n": 3})
-    scratch.transposed[:], scratch.b[:] = d.T, d @ [3.0, -5.0, 7.0]
-    memory = packed(scratch)
-    assert qr_pivoted(1e-10, memory.argument) == 2
-    assert [rows[i] for i in scratch.order[:2]] == [1, 2]
-    assert np.abs(np.diag(scratch.transposed)[:2]) == pytest.approx([2.0, 0.6])
-    minimum_norm(2, memory.argument)
-    assert scratch.x == pytest.approx([3.0, -5.0, 0.0])
-
-
 def norm_of(v):
     return np.linalg.norm(v)
 

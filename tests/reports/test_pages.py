@@ -21,7 +21,7 @@ def page(request) -> tuple[str, str]:
 
 
 def test_committed_page_follows_from_the_stored_records(page):
-    """It is made again, and is equal letter by letter."""
+    """Each page of docs/results that is made from records is made again, and is equal letter by letter."""
     name, made = page
     assert (RESULTS / f"{name}.md").read_text() == made, f"python -m reports.pages {name} renews it"
 
