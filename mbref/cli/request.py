@@ -107,19 +107,21 @@ class Request(NamedTuple):
 
         ``check`` is called before, with the motion up to the first sample time.
         """
-        from mbref.simulation.simulate import are_compiled, prepare, simulate
+        from mbref.simulation.simulate import are_compiled, check_method, prepare, simulate
 
         method = self.method or default_method(self.scene)
         method = Method.parse(method) if isinstance(method, str) else method
-        if not are_compiled(method):
-            prepare(method)
-        with progress_bar("simulating", float(self.times[-1])) as progress:
-            if check:
-                check(simulate(*self._replace(times=self.times[:1]), progress))
-            try:
+        try:
+            if self.method:
+                check_method(method, self.scene, self.limits)
+            if not are_compiled(method):
+                prepare(method)
+            with progress_bar("simulating", float(self.times[-1])) as progress:
+                if check:
+                    check(simulate(*self._replace(times=self.times[:1]), progress))
                 return simulate(*self, progress)
-            except (MethodError, InputError) as error:
-                raise type(error)(with_option(str(error))) from None
+        except (MethodError, InputError) as error:
+            raise type(error)(with_option(str(error))) from None
 
 
 def request_of(options: argparse.Namespace, branches: Mapping[int, int] | None = None) -> Request:

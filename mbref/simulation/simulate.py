@@ -162,6 +162,15 @@ def _by_default(scene: Scene, times: np.ndarray, limits: Limits, progress: Progr
 
 def checked_run(scene: Scene, method: Method, times: np.ndarray, limits: Limits) -> Run:
     """Return the run of a scene; raises MethodError for limits that the method does not support."""
+    check_method(method, scene, limits)
+    try:
+        return start_run(scene, method, times, limits)
+    except NoGeneratedCode as reason:
+        raise MethodError(f"code: no generated code for {scene.name!r} by {method}: {reason}") from None
+
+
+def check_method(method: Method, scene: Scene, limits: Limits) -> None:
+    """Raise MethodError for limits or loads that the method does not support, before anything is compiled."""
     if limits.branches and method.crosses != "by series":
         raise MethodError(f"branches: {method} does not cross singular positions; use taylor")
     if limits.code == GENERATED and not method.is_series:
@@ -171,10 +180,6 @@ def checked_run(scene: Scene, method: Method, times: np.ndarray, limits: Limits)
             f"{method}: the ends of the damped spring load[{found[0]}] coincide at the start, so that its "
             f"force has no series; use {default_method(scene)}"
         )
-    try:
-        return start_run(scene, method, times, limits)
-    except NoGeneratedCode as reason:
-        raise MethodError(f"code: no generated code for {scene.name!r} by {method}: {reason}") from None
 
 
 def finish_run(run: Run, progress: Callable[[float], None] | None = None) -> Motion:

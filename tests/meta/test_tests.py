@@ -2,6 +2,7 @@
 
 import ast
 import functools
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -36,19 +37,16 @@ def is_private(name: str) -> bool:
     return name.startswith("_") and not name.endswith("_")
 
 
+DEFINED = re.compile(  # definitions, and targets of assignments and loops, which may have several names
+    r"\b(?:def|class|as|for)\s+(_\w+)|\b(_\w+)(?=(?:,\s*[*\w.]+)*\)?\s*(?::[^=\n]*)?=(?!=))"
+)
+
+
 @functools.cache
 def private_names() -> frozenset[str]:
     """Return the private names of functions, classes, constants and attributes of the product."""
-    found = set()
-    for package in PRODUCT:
-        for path in (ROOT / package).rglob("*.py"):
-            for node in ast.walk(parsed(path)):
-                if isinstance(node, ast.FunctionDef | ast.ClassDef):
-                    found.add(node.name)
-                elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-                    found.add(node.id)
-                elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
-                    found.add(node.attr)
+    paths = [path for package in PRODUCT for path in (ROOT / package).rglob("*.py")]
+    found = {name for path in paths for names in DEFINED.findall(path.read_text()) for name in names}
     return frozenset(name for name in found if is_private(name))
 
 
