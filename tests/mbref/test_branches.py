@@ -128,7 +128,7 @@ def test_crossing_read_from_a_record_file_equals_the_saved_one(tmp_path):
     assert np.array_equal(read.angular_velocity, crossing.angular_velocity)
 
 
-def test_crossings_are_none_if_the_method_does_not_detect_them_and_otherwise_empty_if_none_is_passed():
+def test_crossings_are_none_without_detection_and_empty_if_no_position_is_passed():
     """Coordinate partitioning detects none. The series pass none: a crank of 0.1 m and a rod of 0.3 m have no
     singular position."""
     assert simulate(four_bar_gravity(0.3), "mpi-svd+partitioning", [0.1]).crossings is None

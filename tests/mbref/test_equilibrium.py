@@ -47,7 +47,7 @@ def test_scene_of_an_equilibrium_counts_angles_from_its_pose_and_is_its_own_equi
         ({"body": [{"name": "rod", "position": [ARM, 0.0, 0.0]}]}, r"body\[rod\].mass: is missing"),
     ],
 )
-def test_scene_that_has_no_equilibria_is_refused_with_the_driver_or_the_mass_that_is_the_cause(change, says):
+def test_scene_without_equilibria_is_refused_with_the_driver_or_mass_that_is_the_cause(change, says):
     """A driver may accelerate, oscillate, turn about an axis across gravity, or hold the only freedom; a body
     may have no mass."""
     with pytest.raises(SceneError, match=says):
