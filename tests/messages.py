@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from mbref.command_line import Parser
+from tests.meta.imports import parsed
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("mbref", "crosscheck", "reports")
@@ -21,9 +22,8 @@ def text_of(node: ast.expr) -> str:
     return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
 
 
-def messages(source: str) -> Iterator[tuple[int, str]]:
-    """Yield line and text of each message of a file's source."""
-    tree = ast.parse(source)
+def messages(tree: ast.Module) -> Iterator[tuple[int, str]]:
+    """Yield line and text of each message of a file."""
     nodes = list(ast.walk(tree))
     skipped = {id(part) for node in nodes if isinstance(node, ast.JoinedStr) for part in node.values}
     skipped |= {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
@@ -38,7 +38,7 @@ def collected() -> Iterator[tuple[str, int, str]]:
     """Yield file, line and text of every message of the packages."""
     for package in PACKAGES:
         for path in sorted((ROOT / package).rglob("*.py")):
-            for line, text in messages(path.read_text()):
+            for line, text in messages(parsed(path)):
                 yield str(path.relative_to(ROOT)), line, text
 
 

@@ -1,5 +1,6 @@
 """Messages are in plain words; `python -m tests.messages` prints all of them in a row."""
 
+import ast
 import functools
 import re
 
@@ -39,4 +40,4 @@ def test_messages_contain_no_private_word_and_no_phrase_without_a_noun(unclear):
 )
 def test_collector_finds_messages_and_leaves_out_docstrings_and_short_texts(source, found):
     """Four lines of source and the messages in them; ``{…}`` stands for a value."""
-    assert [text for _, text in messages(source)] == found
+    assert [text for _, text in messages(ast.parse(source))] == found
