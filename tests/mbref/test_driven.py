@@ -27,8 +27,8 @@ def flat_times(end):
 )
 @pytest.mark.parametrize("name", ["four_bar", "five_bar"])
 def test_every_flat_position_of_a_driven_parallelogram_is_recorded_at_its_time(name, limits):
-    """Poses meet the parallelogram's closed form to rounding. The crank passes 40 half turns in 1 s; at each
-    recorded time it is within 1e-9 rad of one."""
+    """Poses meet the parallelogram's closed form to rounding. From a quarter turn, at 124.8 rad/s, the crank
+    passes 40 half turns in 1 s; at each recorded time it is within 1e-9 rad, its turn in 8e-12 s, of one."""
     scene = SCENES[name]()
     run = simulate(scene, "taylor", np.linspace(0.0, 1.0, 9), Limits(**limits))
     assert relative_error(run, scene) < ROUNDING

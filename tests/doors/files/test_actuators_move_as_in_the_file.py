@@ -66,7 +66,7 @@ CONTROLS = [0.4, -0.7, 0.5, 1.2, -0.3, 0.8, 0.0, 0.0, 0.9]
 
 def test_servos_of_a_keyframe_accelerate_their_joints_as_in_mujoco(files):
     """MuJoCo's qacc at a keyframe with random angles and speeds is the truth. The keyframe is chosen by its
-    name, or by its number if it has none."""
+    name, or by its number if it has none; ``act`` has the states of the two integrating actuators."""
     random = np.random.default_rng(3)
     for name in ("pose", ""):
         qpos = " ".join(map(str, random.uniform(-4, 4, len(SERVOS))))
@@ -107,28 +107,16 @@ def test_wheel_on_a_spring_and_a_servo_swings_about_their_common_natural_angle(f
 @pytest.mark.parametrize(
     ("actuator", "key", "says"),
     [
-        ("<position joint='JOINT' kp='5' forcerange='-1 1'/>", "", "actuator 0, whose range of forces"),
-        (
-            "<muscle name='m' joint='JOINT' lengthrange='0 1'/>",
-            "ctrl='1'",
-            "actuator 'm', whose force is not linear",
-        ),
-        (
-            "<position name='s' joint='JOINT' kp='5' timeconst='.1'/>",
-            "ctrl='1'",
-            "'s', whose input changes over time",
-        ),
-        ("<position name='s' joint='JOINT' kp='-5'/>", "", "'s', whose stiffness or damping is negative"),
-        (
-            "<motor name='s' site='there' gear='0 0 1 0 0 0'/>",
-            "ctrl='1'",
-            "'s', which acts on no single hinge or slide",
-        ),
+        ("position joint='JOINT' kp='5' forcerange='-1 1'", "", "actuator 0, whose range of forces"),
+        ("muscle name='m' joint='JOINT' lengthrange='0 1'", "ctrl='1'", "'m', whose force is not linear"),
+        ("position name='s' joint='JOINT' kp='5' timeconst='.1'", "ctrl='1'", "'s', whose input changes"),
+        ("position name='s' joint='JOINT' kp='-5'", "", "'s', whose stiffness or damping is negative"),
+        ("motor name='s' site='there' gear='0 0 1 0 0 0'", "ctrl='1'", "'s', which acts on no single hinge"),
     ],
 )
 def test_an_actuator_that_a_scene_cannot_have_is_refused_or_left_out_on_request(files, actuator, key, says):
     """The request is --without motors, which the refusal names; the scene then has no load."""
-    text = model_of([actuator], f"name='k' {key}" if key else "")
+    text = model_of([f"<{actuator}/>"], f"name='k' {key}" if key else "")
     text = text.replace("</worldbody>", "<site name='there'/></worldbody>")
     words = ("--keyframe", "k") if key else ()
     said = files.refusal(text, "a.xml", *words)
@@ -138,7 +126,8 @@ def test_an_actuator_that_a_scene_cannot_have_is_refused_or_left_out_on_request(
 
 
 def test_controls_and_forces_of_motors_are_clipped_as_in_mujoco(files):
-    """Ranges of a control, an actuator's force and a joint's force; MuJoCo's qacc is the truth."""
+    """Controls of 3 N are beyond the ranges of a control, an actuator's force and a joint's force; MuJoCo's
+    qacc is the truth."""
     parts = [
         "<motor joint='JOINT' ctrlrange='-1 1' ctrllimited='true' gear='2'/>",
         "<motor joint='JOINT' forcerange='-0.5 0.5' gear='2'/>",

@@ -38,12 +38,9 @@ PLACES = [
 
 
 BY_MUJOCO = {  # numbers that MuJoCo's own reader refuses first
-    ('mass="1"', "-inf"),
-    ('mass="1"', "nan"),
-    ('diaginertia="2 2 2"', "-inf"),
-    ('diaginertia="2 2 2"', "nan"),
-    ("0 0 1", "nan"),
-}
+    ('mass="1"', "-inf"), ('mass="1"', "nan"), ('diaginertia="2 2 2"', "-inf"),
+    ('diaginertia="2 2 2"', "nan"), ("0 0 1", "nan"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("number", ["1e300", "inf", "-inf", "nan"])
@@ -80,11 +77,13 @@ def test_an_empty_mjcf_model_is_refused_under_the_suffix_of_each_format(files, n
 
 @pytest.mark.parametrize("name", ["a.urdf", "a.sdf"])
 def test_an_unknown_encoding_is_refused_with_a_sentence_on_the_encoding(files, name):
+    """The first line of a right file names the encoding "none-such"."""
     text = {"a.urdf": ROBOT, "a.sdf": MODEL}[name]
     assert "encoding" in files.refusal(f'<?xml version="1.0" encoding="none-such"?>{text}', name)
 
 
 def test_a_file_in_utf_16_is_read_with_the_names_of_its_links(files):
+    """The SDF file's only link is named "é"."""
     text = '<?xml version="1.0" encoding="utf-16"?>' + MODEL.replace('name="a"', 'name="é"')
     text = text.replace("<child>a", "<child>é")
     scene, _ = files.scene(text.encode("utf-16"), "a.sdf")
@@ -93,23 +92,23 @@ def test_a_file_in_utf_16_is_read_with_the_names_of_its_links(files):
 
 @pytest.mark.parametrize("deep", [300, 5000])
 def test_elements_nested_too_deep_are_refused_with_their_depth(files, deep):
-    """The root element is one level more. In SDF the link in the innermost model is another one."""
+    """``deep`` elements and the root are one level more; in SDF the link in the innermost model is
+    another."""
     urdf = ROBOT.replace("</robot>", f"{'<more>' * deep}{'</more>' * deep}</robot>")
     assert f"nested {deep + 1} deep; at most 200 are read" in files.refusal(urdf, "a.urdf")
     models = "".join(f"<model name='m{k}'><link name='l'/>" for k in range(deep)) + "</model>" * deep
-    assert f"nested {deep + 2} deep; at most 200 are read" in files.refusal(
-        f"<sdf version='1.9'>{models}</sdf>", "a.sdf"
-    )
+    said = files.refusal(f"<sdf version='1.9'>{models}</sdf>", "a.sdf")
+    assert f"nested {deep + 2} deep; at most 200 are read" in said
 
 
 def test_a_chain_of_300_links_or_bodies_is_refused_with_its_length(files):
     """Links in URDF, bodies in MJCF."""
-    many = 300
-    links = "".join(f'<link name="l{k}"/>' for k in range(many + 1))
-    joints = "".join(
-        f'<joint name="j{k}" type="continuous"><parent link="l{k}"/><child link="l{k + 1}"/></joint>'
-        for k in range(many)
+    many, joint = (
+        300,
+        '<joint name="j{0}" type="continuous"><parent link="l{0}"/><child link="l{1}"/></joint>',
     )
+    links = "".join(f'<link name="l{k}"/>' for k in range(many + 1))
+    joints = "".join(joint.format(k, k + 1) for k in range(many))
     said = files.refusal(f'<robot name="r">{links}{joints}</robot>', "a.urdf")
     assert f"links carry each other {many} deep; at most 200 are read" in said
     bodies = "<body><joint/><geom size='1'/>" * many + "</body>" * many
@@ -141,14 +140,14 @@ def test_a_broken_configuration_of_an_included_model_is_named(files, configurati
 def test_models_that_include_each_other_400_deep_are_refused(files):
     """Each of 400 files includes the next one."""
     for k in range(400):
-        include = f"<include><uri>m{k + 1}.sdf</uri></include>"
-        (files.folder / f"m{k}.sdf").write_text(
-            f"<sdf version='1.9'><model name='m{k}'>{include}<link name='l'/></model></sdf>"
-        )
+        inside = f"<include><uri>m{k + 1}.sdf</uri></include><link name='l'/>"
+        text = f"<sdf version='1.9'><model name='m{k}'>{inside}</model></sdf>"
+        (files.folder / f"m{k}.sdf").write_text(text)
     text = "<sdf version='1.9'><model name='m'><include><uri>m0.sdf</uri></include></model></sdf>"
     assert "models are nested more than 200 deep" in files.refusal(text, "m.sdf")
 
 
 @pytest.mark.parametrize("version", ["abc", "", "1.x", "1..6"])
 def test_an_sdf_version_that_is_not_a_number_is_refused(files, version):
+    """Versions are two numbers with a point, such as 1.9."""
     assert "is no version of SDF" in files.refusal(MODEL.replace("1.9", version), "a.sdf")

@@ -14,20 +14,12 @@ from tests.fuzz.broken_files import RECORD
 
 FOREIGN = [b"null\n", b"[" * 100_000 + b"\n", b"\xff\xfe\x00\n", b"[]\n", b'{"key": 1}\n', b"\x1b[31m\n"]
 FAULTS: list[tuple[str, Any]] = [
-    ("outcome", None),
-    ("outcome", "FLYING"),
-    ("metrics", {"error": "small"}),
-    ("cost", {}),
-    ("times", "soon"),
-    ("scene", 1),
-    ("asked", {"engine": "mbref"}),
-    ("versions", []),
-    ("commit", [[1]]),
+    ("outcome", None), ("outcome", "FLYING"), ("metrics", {"error": "small"}), ("cost", {}),
+    ("times", "soon"), ("scene", 1), ("asked", {"engine": "mbref"}), ("versions", []), ("commit", [[1]]),
     ("bodies", {"crank": {"position": [[0.0, 0.0]] * 2, "orientation": []}}),
-    ("reactions", {"A": [["far"] * 6] * 2}),
-    ("angles", {"A": [10**400, 0.0]}),
+    ("reactions", {"A": [["far"] * 6] * 2}), ("angles", {"A": [10**400, 0.0]}),
     ("crossings", [{"time": 0.1}]),
-]
+]  # fmt: skip
 
 
 def folder(place: Path, lines: bytes) -> Path:
@@ -80,7 +72,7 @@ def test_faulty_field_of_a_record_is_named(field, value, tmp_path, capsys):
     ],
 )
 def test_record_whose_parts_do_not_fit_is_named(field, value, said, tmp_path, capsys):
-    """Reactions at one of two times; a scene whose file is lost."""
+    """Reactions at one of two times; no states, which pictures need; a scene whose file is lost."""
     assert report(["--render", str(folder(tmp_path / "r", record_with(field, value)))]) == 2
     shown = capsys.readouterr().err
     assert "records.jsonl: record 'k1'" in shown and said in shown and shown.count("\n") == 1
@@ -102,7 +94,7 @@ BESIDE = {  # faulty content of a file beside right records, and words of the fa
 
 @pytest.mark.parametrize(("name", "content", "says"), BESIDE.values(), ids=BESIDE)
 def test_faulty_file_beside_right_records_is_named_with_its_fault(name, content, says, tmp_path, capsys):
-    """LACKING is a line with only a key and a scene."""
+    """LACKING is a line with only a key and a scene; other contents are no JSON."""
     place = folder(tmp_path / "r", record_with("seed", 0))
     (place / name).parent.mkdir(exist_ok=True)
     (place / name).write_bytes(content)
@@ -188,6 +180,7 @@ def test_table_of_records_names_a_record_that_it_cannot_show(command, record, tm
 
 @of_each_table
 def test_table_of_records_reports_an_incomplete_last_line(command, record, tmp_path, capsys):
+    """A line "{" behind a right record, as of a study that is being written."""
     assert table(command, tmp_path, record, b"\n{") == 0
     assert "the last line is incomplete and was left out" in capsys.readouterr().err
 

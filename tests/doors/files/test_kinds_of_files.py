@@ -66,16 +66,10 @@ REFUSED = {
 }
 ROWS_OF_OUR_OWN = ("close", "mimic")  # MuJoCo reads none from a URDF; see test_robot_files.py
 SLOW = (  # 1 to 16 s
-    "excavator_with_springs.xml",
-    "gripper_2f.xml",
-    "gripper_coupled_by_springs.xml",
-    "hand_of_tendons.xml",
-    "kangaroo_leg.xml",
-    "leg_with_shin_spring.xml",
-    "stewart.xml",
-    "stewart_with_cylinders.xml",
-    "wheel_with_gearbox.xml",
-)
+    "excavator_with_springs.xml", "gripper_2f.xml", "gripper_coupled_by_springs.xml",
+    "hand_of_tendons.xml", "kangaroo_leg.xml", "leg_with_shin_spring.xml", "stewart.xml",
+    "stewart_with_cylinders.xml", "wheel_with_gearbox.xml",
+)  # fmt: skip
 READ = sorted(path.name for path in KINDS.iterdir() if path.name not in REFUSED)
 
 
@@ -85,17 +79,13 @@ def found(name: str) -> Source:
     return source(KINDS / name, options)
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=pytest.mark.slow if name in SLOW else ())
-        for name in READ
-        if not name.startswith(ROWS_OF_OUR_OWN)
-    ],
-)
+BY_MUJOCO = [name for name in READ if not name.startswith(ROWS_OF_OUR_OWN)]
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in BY_MUJOCO])
 def test_imported_scene_moves_as_mujoco_s_model_of_the_file(name):
-    """The judge moves the scene; the file's masses, forces and rows by MuJoCo are integrated finely, with the
-    controls of the last keyframe."""
+    """``apart`` is the difference of two motions over 0.02 s: the judge's of the scene, and MuJoCo's masses,
+    forces and rows of the file, with the controls of its last keyframe, integrated finely."""
     read_file = found(name)
     assert apart(read_file.original, read_file, END, read_file.original.nkey - 1) < SAME
 
@@ -119,7 +109,8 @@ def test_pinocchio_builds_the_machine_of_the_urdf(name):
 
 
 def test_loop_is_closed_between_joints_as_between_their_child_links():
-    """Joints of a loop are named as frames by users of YAML files of parallel robots."""
+    """YAML files of parallel robots name the joints at both ends of a loop. Both ways close it with a ball
+    joint at one place."""
     joints = {joint.find("child").get("link"): joint.get("name") for joint in joints_of("close.urdf")}
     pair = ImportOptions(close=[f"{joints['fb']}={joints['fc']}"])
     by_joints = source(KINDS / "close.urdf", pair).imported.scene
@@ -143,6 +134,7 @@ def joints_of(name):
 
 
 def test_attribute_of_an_older_mujoco_is_named_with_the_version_that_lacks_it(tmp_path):
+    """MuJoCo 2 had the attribute collision of <option>; MuJoCo 3 has not."""
     (tmp_path / "old.xml").write_text('<mujoco><option collision="all"/></mujoco>')
     with pytest.raises(SceneError, match=r"'collision'.*'option'.*MuJoCo \d.* does not have it, older"):
         source(tmp_path / "old.xml", ImportOptions())

@@ -31,21 +31,10 @@ from tests.reports import synthetic
 
 FALLING = "tests.helpers.falling_engine:ENGINE"
 NAMES = [
-    "../../other",
-    "/etc/passwd",
-    "a/b",
-    "two words",
-    'it\'s "quoted"',
-    "$(touch pwned)",
-    "`touch pwned`",
-    "<img src=x onerror=alert(1)>",
-    "[link](http://example.org)",
-    "$x_1$ {y}",
-    "--out=x",
-    "..",
-    "ü" * 100,
+    "../../other", "/etc/passwd", "a/b", "two words", 'it\'s "quoted"', "$(touch pwned)", "`touch pwned`",
+    "<img src=x onerror=alert(1)>", "[link](http://example.org)", "$x_1$ {y}", "--out=x", "..", "ü" * 100,
     "a|b & c;d",
-]
+]  # fmt: skip
 
 
 def named(name: str) -> Scene:
@@ -71,8 +60,8 @@ def test_file_names_of_different_names_differ_and_are_safe_words_of_a_shell(tmp_
 
 @pytest.mark.parametrize("name", ["../../up", "$x_1$ {y}", "<img src=x> & '", "$(touch pwned)", "_hidden"])
 def test_pictures_of_any_name_are_xml_in_the_folder_and_legends_show_it(name, tmp_path, monkeypatch, capsys):
-    """An XML parser reads each picture. Names in a legend are shown letter by letter: what stands between
-    dollar signs is no formula of matplotlib."""
+    """An XML parser reads the pictures of three commands. A legend shows the name letter by letter: what
+    stands between dollar signs is no formula of matplotlib (``get_parse_math``)."""
     monkeypatch.chdir(tmp_path)
     named(name).save("scene.toml")
     assert main(["draw", "scene.toml"]) == 0
@@ -104,18 +93,14 @@ def test_page_and_markdown_of_a_report_show_a_name_without_acting_on_its_markup(
     """A parser of CommonMark finds no HTML, link or emphasis, and the heading's text is the name without its
     backticks, which mean code on purpose."""
     card = Card("k-1", name, "right", "✓", {}, name, shlex.join(["crosscheck", "run", name]), name)
+    verdict = Verdict(name, name, name, [name], "", "")
     blocks = [
         Heading(name, 2),
         Text(name),
         Table(name, [name], [[name]]),
         Figure("figure", name, lambda: "<svg/>"),
         Record("r-1", name, name, 0, [card], "c-1"),
-        Matrix(
-            name,
-            [("e", name, 0, "")],
-            [(name, name)],
-            {name: {"e": [Verdict(name, name, name, [name], "", "")]}},
-        ),
+        Matrix(name, [("e", name, 0, "")], [(name, name)], {name: {"e": [verdict]}}),
         Listing(f"```\n{name}"),
     ]
     assert "<img src=x" not in html(blocks, {"figure": "<svg/>"}, name)
@@ -152,7 +137,8 @@ def test_printed_commands_of_a_report_name_the_scene_file_as_one_word(name):
 
 @pytest.mark.parametrize("name", ["../../other", "a/b", "two words"])
 def test_report_and_its_pack_keep_a_scene_of_any_name_in_their_folder(name, tmp_path, capsys):
-    """The command of the report, in the folder of its page, reads the scene; the packed records have it."""
+    """No file is outside of the folders a and c. The command that the report prints names the scene's file,
+    in the folder of the page, and the packed records have its name."""
     scene, out, packed = tmp_path / "scene.toml", tmp_path / "a" / "b", tmp_path / "c" / "d"
     STONE.with_(name=name).save(scene)
     asked = ["--engine", FALLING, "--quick", "--section", "provenance", "--out", str(out)]

@@ -34,7 +34,8 @@ def test_a_packed_folder_renders_as_the_folder_itself_and_has_equal_records(tmp_
 
 @pytest.mark.parametrize("words", [["--section", "paper"], []], ids=["paper", "all sections"])
 def test_a_report_folder_without_the_records_of_the_section_is_named(words, capsys):
-    """The folder has the records of the stability ladders alone."""
+    """The committed folder has records of the stability ladders alone, neither of the paper nor of a
+    report."""
     assert report(["--render", str(REPORTS / "stability"), *words]) == 2
     assert str(REPORTS / "stability") in capsys.readouterr().err
 
@@ -64,6 +65,7 @@ def test_a_compressed_file_of_records_is_read_and_refused_where_records_are_adde
     ],
 )
 def test_a_damaged_compressed_file_of_records_is_named(damage, says, tmp_path, capsys):
+    """The last nine bytes are missing, or a whole file holds other text than records."""
     path = tmp_path / "records.jsonl.xz"
     rewrite(path, [RECORD])
     path.write_bytes(damage(path.read_bytes()))
@@ -73,7 +75,7 @@ def test_a_damaged_compressed_file_of_records_is_named(damage, says, tmp_path, c
 
 
 def test_committed_reports_have_at_most_6_megabytes_and_no_record_outside_a_pack():
-    """Pictures and pages, which are made from the records, do not count."""
+    """A clone stays small. Pictures and pages, which are made from the records, do not count."""
     paths = [path for path in REPORTS.rglob("*") if path.is_file() and "__pycache__" not in path.parts]
     kept = [path for path in paths if path.suffix != ".png" and path.name != "index.html"]
     assert sum(path.stat().st_size for path in kept) < 6e6

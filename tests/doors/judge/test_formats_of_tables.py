@@ -9,6 +9,7 @@ import pytest
 import crosscheck
 from crosscheck.cli import main
 from mbref.scene import Scene
+from tests.helpers.coupled_mechanisms import body
 from tests.helpers.tables import FORMATS, Table, double_pendulum, spinning_rod, write_table
 
 SCENES = {"double_pendulum": double_pendulum, "spinning_rod": spinning_rod}
@@ -166,8 +167,8 @@ def engineering(number: float) -> str:
     ids=["%.5f", "engineering", "single"],
 )
 def test_quaternions_of_random_signs_are_right_at_rounded_times_in_any_format(form, axes, tmp_path):
-    """The rod turns by 16 t; times are random, and q and -q are one orientation. The table with a velocity of
-    opposite sign is off."""
+    """The rod's centre, 0.5 m from the hinge, turns by 16 t rad; times are random, and q and -q are one
+    orientation. The table with a velocity of opposite sign is off."""
     rng, names = np.random.default_rng(4), [f"rod.orientation.{a}" for a in axes]
     times = np.sort(rng.uniform(0.0, 1.0, 30))
     sign, angle = rng.choice([-1.0, 1.0], 30), 16 * times
@@ -184,17 +185,11 @@ def test_quaternions_of_random_signs_are_right_at_rounded_times_in_any_format(fo
 @pytest.mark.parametrize("above", ["", "2026-11-29 10:30\n", "1.5.2 export\n\n"])
 def test_bodies_are_told_apart_by_the_case_of_letters_under_any_lines(above: str, tmp_path: Path) -> None:
     """Bodies `2` and `rod` rest, `Rod` moves by 2 t without joints; a date or version may stand above."""
-    scene = Scene(
-        name="free",
-        body=[
-            {"name": n, "mass": 1, "inertia": [1, 1, 1], "position": [0, 0, 0], "velocity": [v, 0, 0]}
-            for n, v in (("2", 0), ("rod", 0), ("Rod", 2))
-        ],
-    )
-    path = tmp_path / "run.csv"
-    path.write_text(
-        above + "2.x,Rod.x,rod.x,time\n0.0000,0.0000,0.0000,0\n0.0000,1.0000,0.0000,0.5\n", encoding="utf-8"
-    )
+    speeds, path = {"2": 0.0, "rod": 0.0, "Rod": 2.0}, tmp_path / "run.csv"
+    bodies = [body(n, 1.0, [1.0] * 3, (0, 0, 0), velocity=[v, 0, 0]) for n, v in speeds.items()]
+    scene = Scene(name="free", body=bodies)
+    rows = "2.x,Rod.x,rod.x,time\n0.0000,0.0000,0.0000,0\n0.0000,1.0000,0.0000,0.5\n"
+    path.write_text(above + rows, encoding="utf-8")
     found = crosscheck.judge_motion(scene, path)
     assert found.is_right and {c.name.partition(".")[0] for c in found.columns} == {"2", "Rod", "rod"}
 
@@ -204,9 +199,8 @@ def test_rows_after_the_end_of_the_reference_are_not_right(tmp_path: Path, capsy
     about 1 s of 1000 s. The invented last row makes the exit status 1, though the rows before are right."""
     double_pendulum().with_(duration=1000.0).save(tmp_path / "scene.toml")
     path = tmp_path / "run.csv"
-    path.write_text(
-        "time,A.angle\n0,0.000000\n0.001,0.000000\n0.002,0.000000\n1000,7.000000\n", encoding="utf-8"
-    )
+    rows = "time,A.angle\n0,0.000000\n0.001,0.000000\n0.002,0.000000\n1000,7.000000\n"
+    path.write_text(rows, encoding="utf-8")
     limits = ["--reference-time", "0.3", "--tolerance", "1e-4"]
     assert main(["judge", str(tmp_path / "scene.toml"), str(path), *limits]) == 1
     shown = " ".join(capsys.readouterr().out.split())

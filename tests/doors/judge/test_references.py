@@ -136,9 +136,7 @@ def test_weaker_joints_that_leave_no_row_redundant_do_not_depend_on_the_size(nam
         pytest.param(30.0, 1, ["unknown: J.angle"], np.nan, id="ten turns", marks=pytest.mark.slow),
     ],
 )
-def test_angle_after_400_unsampled_oscillations_is_exact_or_unknown(
-    amplitude, status, unknown, end, tmp_path, capsys
-):
+def test_angle_not_sampled_for_400_s_is_exact_or_unknown(amplitude, status, unknown, end, tmp_path, capsys):
     """A driver moves the wheel by a sin(2π t), and the only samples are at 0 and 400 s, where its angle is 0.
     Amplitudes of 0.6 rad are followed. Of 30 rad the command reports the angle as unknown, with status 1."""
     sine = {"amplitude": amplitude, "frequency": 2 * np.pi}

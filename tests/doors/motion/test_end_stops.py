@@ -81,8 +81,8 @@ def ball_on_plate(restitution: float, duration: float) -> Scene:
 
 @pytest.mark.parametrize(("scene", "below"), [(ball, 0.0), (ball_on_plate, 3.0)], ids=["ground", "plate"])
 def test_bounces_without_end_become_a_contact_that_carries_the_weight(scene, below):
-    """They end at t₀ (1 + e) / (1 - e), without the flights below 1e-6 of the end time. The lowest joint
-    carries the weight of the ball and of the mass ``below`` it (kg)."""
+    """With e = 0.2 they end at t₀ (1 + e) / (1 - e) = 1.5 t₀, to the flights below 1e-6 of the end time, 1 s,
+    which are left out. The lowest joint carries the weight of 2 kg and of the mass ``below`` them (kg)."""
     motion = mbref.simulate(scene(0.2, 1.0), "taylor", times=[0.0, 0.9, 1.0])
     last = motion.events[-1]
     assert last.stops == last.chatter == ("S.lower",) and "bounces end" in last.sentence
