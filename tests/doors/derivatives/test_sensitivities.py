@@ -105,7 +105,9 @@ def position_of_rocker(times, bx, by, cx, cy):
     ids=["slider-crank", "four-bar"],
 )
 def test_positions_of_a_driven_linkage_depend_on_pins_as_in_closed_form_and_not_on_masses(last, output, form):
-    """The linkages have redundant rows; no driver's motion depends on a mass."""
+    """With the crank's pin at (x_B, y_B), the slider is displaced by √(l² - (y_C - y_B)²) + x_B - x_C; C of
+    the four-bar is where circles about B and D meet. Their derivatives, by a complex step (``slope``), are
+    the truth. No driver's motion depends on a mass."""
     times = np.array([0.2, 0.9])
     numbers = {"bx": 0.2, "by": 0.1, "cx": 0.9, "cy": 0.5}
     paths = ["joint[B].anchor.x", "joint[B].anchor.y", "joint[C].anchor.x", "joint[C].anchor.y"]

@@ -115,7 +115,8 @@ def crankshaft(singular: int, count: int) -> Scene:
 
 @pytest.mark.parametrize("singular", [0, 3])
 def test_one_singular_loop_among_many_ends_the_run(singular):
-    """Five cylinders on a shaft at 30 rad/s: the run ends in a turn, with the links of a loop in line."""
+    """Five cylinders on a shaft at 30 rad/s; one has a rod as long as its crank. The run ends in the first
+    turn, where this crank is across the slide and on one line with its rod, to 1e-3 rad."""
     scene = crankshaft(singular, 5)
     run = simulate(scene, METHOD, np.linspace(0.0, 0.1, 21))
     assert run.outcome.name == "SINGULAR_POSITION", run.message
