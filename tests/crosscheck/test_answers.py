@@ -67,7 +67,8 @@ def test_a_completed_run_of_zero_seconds_is_a_well_formed_answer():
 
 
 def test_numbers_of_numpy_in_an_answer_become_floats_and_ints():
-    """The engine SCALARS answers with numpy's numbers, and with lists of velocities and bodies."""
+    """The engine SCALARS answers with numpy's numbers, such as 7 steps, and with lists of velocities and
+    bodies."""
     run = well_formed(SCALARS.run(SCENE, TIMES, Setting("a")), SCENE, TIMES)
     assert json.loads(json.dumps(run.to_record()))["cost"]["steps"] == 7
     kinds = [type(x) for x in (run.t_end, run.cost.seconds, run.cost.steps, run.settings["seconds"])]

@@ -86,7 +86,8 @@ def two(tmp_path, monkeypatch) -> tuple[str, ...]:
 
 
 def test_a_scene_without_a_closed_form_is_judged_by_its_reference(capsys, two):
-    """Bodies at rest have no error; two formulations of the reference agree within 1e-14."""
+    """Two bodies that are left at rest have no error; the reference has the least bound that is stated,
+    1e-14."""
     _, out, _ = run_main(capsys, *two, "--json")
     measured = [record["metrics"] for record in json.loads(out)["records"]]
     assert [(m["error"], m["error_bound"]) for m in measured] == [(0.0, 1e-14)] * 2, measured
@@ -134,7 +135,7 @@ def test_json_of_two_scenes_is_a_list_in_their_order(capsys, tmp_path):
     ],
 )
 def test_a_faulty_option_is_refused_with_status_two_and_its_reason(capsys, still, options, sentence):
-    """Of ``crosscheck run``; the reason is on standard error, and standard output stays empty."""
+    """The command is ``crosscheck run``; standard error has the reason, and standard output stays empty."""
     status, out, err = run_main(capsys, "run", still, "--engine", FAKE, "--json", *options)
     assert status == 2, (status, err)
     assert out == "", out
@@ -170,7 +171,7 @@ def test_a_velocity_that_contradicts_a_joint_is_reported_once_with_the_joints_li
 
 
 def test_an_unknown_scene_is_refused_with_the_known_names(capsys):
-    """Of which four_bar is one."""
+    """The built-in scene four_bar is one of the known."""
     status, _, err = run_main(capsys, "run", "no_such_scene", "--engine", FAKE)
     assert status == 2 and "unknown scene 'no_such_scene'" in err and "four_bar" in err, err
 
@@ -267,7 +268,7 @@ def test_certify_without_python_flint_says_how_to_install_it(capsys, monkeypatch
 
 
 def test_certify_refuses_an_output_file_in_a_missing_folder(capsys, tmp_path):
-    """Before it computes for hours: exit status 2 and the folder's name."""
+    """The command would compute first and write last; it ends at once with status 2 and the folder's name."""
     pytest.importorskip("flint", reason="python-flint is the extra `certify`")
     status, _, err = run_main(capsys, *CERTIFY, str(tmp_path / "nowhere" / "table.json"))
     assert status == 2 and err.endswith(f"argument --out: there is no folder {tmp_path / 'nowhere'}\n"), err

@@ -167,8 +167,7 @@ def test_only_a_driver_of_the_crank_prescribes_the_path_of_a_spatial_slider_cran
     """`driven_sign` is the sense in which a driver moves the path's angle. A driver of the crank's hinge A
     has sign 1; one of the slide D prescribes no angle: None."""
     path = spatial_slider_crank(spatial(line, order, reverse, way))
-    signs = [path.driven_sign(Driver(joint=name, polynomial=(0.0, 1.0))) for name in "AD"]
-    assert signs == [1.0, None]
+    assert [path.driven_sign(Driver(joint=name, polynomial=(0.0, 1.0))) for name in "AD"] == [1.0, None]
 
 
 @pytest.mark.parametrize("q", CRANK_ANGLES)

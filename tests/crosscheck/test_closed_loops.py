@@ -67,12 +67,17 @@ def test_cell_has_the_run_of_least_error_and_the_run_of_the_defaults() -> None:
     assert matrix(found)["mujoco"]["Bennett"].best() is None
 
 
-def test_sentence_and_command_of_a_run_state_its_setting_and_the_sentence_its_error_or_failure() -> None:
-    """``rerun`` is the command that repeats the run, by the first mechanism's place in the collection."""
-    right = measured(1e-9)
-    assert "tuned (step 0.001)" in sentence(right) and "1e-09" in sentence(right)
-    assert rerun(right).startswith(f"crosscheck run {FIRST.place()} --engine mujoco --setting tuned")
+def test_sentence_on_a_run_states_its_setting_and_its_error_or_failure() -> None:
+    """`measured` gives records of MuJoCo's family "tuned" at a step of 1 ms: one with an error of 1e-9, and
+    one that failed with the message of a singular Jacobian."""
+    assert "tuned (step 0.001)" in sentence(measured(1e-9)) and "1e-09" in sentence(measured(1e-9))
     assert "the Jacobian is singular" in sentence(measured(None, outcome="STEP_FAILED"))
+
+
+def test_command_that_repeats_a_run_names_mechanism_engine_and_setting() -> None:
+    """The mechanism is named by its place in the collection of closed loops."""
+    command = f"crosscheck run {FIRST.place()} --engine mujoco --setting tuned"
+    assert rerun(measured(1e-9)).startswith(command)
 
 
 def test_sentence_on_a_refusal_names_its_reason_and_no_command_repeats_it() -> None:

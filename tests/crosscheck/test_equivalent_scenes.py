@@ -89,7 +89,8 @@ def still(*bodies: Body, **parts: Any) -> Scene:
 
 
 def test_a_body_is_not_split_if_a_name_is_taken_or_a_half_is_too_thin():
-    """Another body has the name "b half". Half of the thin body would have a moment below SMALLEST, kg m²."""
+    """Another body has the name "b half". Half of the thin body would have 0.75 of the smallest moment of
+    inertia that a scene takes (SMALLEST, kg m²)."""
     taken = rewritings.split(still(block("b half"), block()))
     assert isinstance(taken, Outside) and taken.reason.startswith("the halves are not valid bodies: ")
     assert "b half" in taken.reason

@@ -63,7 +63,8 @@ def test_plug_in_simulates_the_scene_and_gives_its_true_motion(installed):
 
 
 def test_short_runs_that_compare_models_compile_no_code():
-    """Each engine's family, of which others have names that end in "compiled"."""
+    """Before a comparison each engine runs the scene briefly, by a family that needs no compilation: families
+    that compile code have names that end in "compiled" or "generated"."""
     found = identity_cases(SCENES["four_bar_gravity"](), ["mbref", "mujoco", "pinocchio"], 60.0)
     assert [case.setting.family for case in found] == ["taylor", "tuned", "tuned"]
 

@@ -45,7 +45,8 @@ CONNECT = '<connect name="C" site1="tip" site2="toe"/>'
 
 
 def test_an_open_connect_of_sites_is_closed_with_the_lengths_of_the_file(tmp_path):
-    """The pin C is 0.6 m from B and 0.5 m from D, and B is 0.25 m from A."""
+    """The pin C is 0.6 m from B and 0.5 m from D, and B is 0.25 m from A. A note states by how much it was
+    open, and the scene moves as MuJoCo's model."""
     found = read(tmp_path, OPEN_LOOP.replace("EQUALITY", CONNECT))
     scene = found.imported.scene
     at = np.array(scene.joint_named("C").anchor)

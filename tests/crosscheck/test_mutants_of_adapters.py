@@ -6,14 +6,13 @@ import math
 import shutil
 import textwrap
 import tomllib
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import crosscheck.engines
-from crosscheck.engine import Engine, Setting, engine
+from crosscheck.engine import Engine, Setting, engine, installed
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import Truth, truth_for
 from mbref.motions.trajectory import Outcome
@@ -25,28 +24,24 @@ FOLDER = Path(crosscheck.engines.__path__[0])
 GENERATORS = ("casadi", "heyoka")  # share the files of the folder symbolic, and keep compiled code
 TIMES = np.array([0.0, 0.05, 0.1])
 TERMS = Setting("terms", {"rtol": 1e-9, "min_step": 1e-3})
-# engine: its module, a setting, and the largest error of the adapter without defect
-WAYS: dict[str, tuple[str, Setting, float]] = {
-    "mujoco": (
-        "mujoco",
-        Setting("forward", {"rtol": 1e-9, "min_step": 1e-3, "beta": 100.0, "hard": 1e-7}),
-        1e-6,
-    ),
-    "pinocchio": ("pinocchio", Setting("tuned", {"rtol": 1e-9, "min_step": 1e-3}), 1e-6),
-    "exudyn": ("exudyn", Setting("trapezoidal", {"step": 1e-3}), 1e-3),
-    "simbody": ("opensim", Setting("merson", {"accuracy": 1e-8}), 1e-4),
-    "drake": ("pydrake", TERMS, 1e-6),
-    "dart": ("dartpy", TERMS, 1e-6),
-    "dart's steps": ("dartpy", Setting("balls", {"step": 1e-4, "erp": 0.5}), 5e-3),
-    "drake's steps": ("pydrake", Setting("discrete", {"step": 1e-4}), 5e-3),
-    "bullet's steps": ("pybullet", Setting("iterated", {"step": 1e-4, "iterations": 1000}), 5e-3),
-    "sundials": ("sksundae", Setting("ggl", {"rtol": 1e-7}), 1e-4),
-    "ondsel": ("pyondsel", Setting("kinematics", {"step": 1e-3}), 1e-6),
-    "mjx": ("mujoco.mjx", Setting("stock", {"step": 1e-3}), 1e-3),
-    "warp": ("mujoco_warp", Setting("stock", {"step": 1e-3}), 1e-3),
-    "casadi": ("casadi", Setting("projected, compiled", {"rtol": 1e-9, "min_step": 1e-3}), 1e-6),
-    "heyoka": ("heyoka", Setting("taylor", {"rtol": 1e-9}), 1e-6),
-    "newton": ("newton", Setting("lox", {"step": 5e-4, "alpha": 0.01}), 5e-3),
+# engine: a setting, and the largest error of the adapter without defect
+WAYS: dict[str, tuple[Setting, float]] = {
+    "mujoco": (Setting("forward", {"rtol": 1e-9, "min_step": 1e-3, "beta": 100.0, "hard": 1e-7}), 1e-6),
+    "pinocchio": (Setting("tuned", {"rtol": 1e-9, "min_step": 1e-3}), 1e-6),
+    "exudyn": (Setting("trapezoidal", {"step": 1e-3}), 1e-3),
+    "simbody": (Setting("merson", {"accuracy": 1e-8}), 1e-4),
+    "drake": (TERMS, 1e-6),
+    "dart": (TERMS, 1e-6),
+    "dart's steps": (Setting("balls", {"step": 1e-4, "erp": 0.5}), 5e-3),
+    "drake's steps": (Setting("discrete", {"step": 1e-4}), 5e-3),
+    "bullet's steps": (Setting("iterated", {"step": 1e-4, "iterations": 1000}), 5e-3),
+    "sundials": (Setting("ggl", {"rtol": 1e-7}), 1e-4),
+    "ondsel": (Setting("kinematics", {"step": 1e-3}), 1e-6),
+    "mjx": (Setting("stock", {"step": 1e-3}), 1e-3),
+    "warp": (Setting("stock", {"step": 1e-3}), 1e-3),
+    "casadi": (Setting("projected, compiled", {"rtol": 1e-9, "min_step": 1e-3}), 1e-6),
+    "heyoka": (Setting("taylor", {"rtol": 1e-9}), 1e-6),
+    "newton": (Setting("lox", {"step": 5e-4, "alpha": 0.01}), 5e-3),
 }
 LOAD, FRAME, START = "sign of a load", "frame or sign of a reaction", "initial velocities"
 KINDS = (LOAD, FRAME, START, "order of bodies", "units")  # of defects, which each adapter could have
@@ -86,11 +81,6 @@ def package(way: str) -> str:
     return way.removesuffix("'s steps")
 
 
-def is_installed(way: str) -> bool:
-    name, _, part = WAYS[way][0].partition(".")
-    return find_spec(name) is not None and (not part or find_spec(f"{name}.{part}") is not None)
-
-
 @functools.cache
 def case(way: str) -> tuple[Scene, Truth]:
     """A mechanism that turns, and its truth: every joint and most loads, with two loops, if the engine maps
@@ -114,7 +104,7 @@ def error_over_limit(simulator: Engine, way: str) -> float:
     """Return the error of poses over its limit in WAYS, or of velocities and reactions over a hundredfold
     limit, whichever is largest; infinite for a run that does not complete."""
     scene, truth = case(way)
-    _, setting, allowed = WAYS[way]
+    setting, allowed = WAYS[way]
     run = simulator.run(scene, TIMES, setting)
     if run.outcome is not Outcome.COMPLETED:
         return math.inf
@@ -147,8 +137,8 @@ def planted(name: str, defect: dict[str, str], folder: Path) -> Engine:
 def test_planted_defect_moves_an_adapter_off_the_reference(way, defect, monkeypatch, tmp_path):
     """One replaced text of the adapter makes the run fail, or puts poses, velocities or reactions off the
     judge's reference by more than the engine's limit in WAYS; without it they are within the limit."""
-    if not is_installed(way):
-        pytest.skip(f"{WAYS[way][0]} is not installed")
+    if not installed(package(way)):
+        pytest.skip(f"{package(way)} is not installed")
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))  # code compiled from the true sources
     assert sound(way) <= 1 < error_over_limit(planted(package(way), defect, tmp_path), way)

@@ -59,7 +59,7 @@ def test_default_and_proximal_solver_agree_with_the_truth_without_redundancy() -
 
 def test_baumgarte_removes_most_of_the_drift_of_rk4() -> None:
     """Errors from the judge's truth over 0.2 s, at steps of 0.15 ms: with feedback less than 0.3 of the error
-    without it ("proximal") is left; 0.3 is "most"."""
+    without it ("proximal") is left."""
     scene = SCENES["planar_slider_crank"]()
     errors = {
         f: completed_error(simulate(scene, 0.2, f, step=1.5e-4), scene) for f in ("proximal", "baumgarte")

@@ -1,14 +1,12 @@
 """MuJoCo's ports / MuJoCo in C at the same settings, and truth; their code is compiled for minutes first."""
 
-from importlib.util import find_spec
-
 import numpy as np
 import pytest
 
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES
 from crosscheck.conformance.mechanisms.closed_forms import screw
 from crosscheck.conformance.mechanisms.features import feature_scenes
-from crosscheck.engine import Owner, Setting, engine
+from crosscheck.engine import Owner, Setting, engine, installed
 from crosscheck.engines.mujoco.ports import OWN_STEPS
 from crosscheck.engines.warp.adapter import ENGINE
 from crosscheck.findings.finding import FOLDER
@@ -24,17 +22,12 @@ from tests.crosscheck.measured import MARGIN
 from tests.crosscheck.side_by_side import side_by_side
 from tests.helpers.coupled_mechanisms import EVERY as COUPLED
 
-MODULES = {"mjx": "mujoco.mjx", "warp": "mujoco_warp"}
+PORTS = ("mjx", "warp")  # of MuJoCo to JAX and to Warp
 LOOP = {"mjx": 6.1e-6, "warp": 1.4e-7}  # MJX leaves J' v out of the closures; Warp rounds to single precision
 GRAVITY = (1.0, -8.0, -5.0)  # m/s²
 
 
-def is_installed(module: str) -> bool:
-    package, _, _ = module.partition(".")
-    return bool(find_spec(package)) and bool(find_spec(module))
-
-
-@pytest.mark.parametrize("name", MODULES)
+@pytest.mark.parametrize("name", PORTS)
 def test_mujoco_s_ports_refuse_drivers(name: str) -> None:
     """They lack MuJoCo's callback, by which its adapter drives; the four-bar without a driver is accepted."""
     refusal = engine(name).cannot(SCENES["four_bar"]())
@@ -48,18 +41,18 @@ def test_warp_sweeps_the_finest_step_only_with_loops_or_couplings() -> None:
     for scene, omitted in ((SCENES["heavy_top"](), 1), (SCENES["bennett"](), 0), (screw()[0], 0)):
         for family in OWN_STEPS:
             of_mjx, of_warp = (
-                [s.options["step"] for s in engine(n).settings(scene) if s.family == family] for n in MODULES
+                [s.options["step"] for s in engine(n).settings(scene) if s.family == family] for n in PORTS
             )
             assert of_warp == of_mjx[: len(of_mjx) - omitted] != [], family
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", MODULES)
+@pytest.mark.parametrize("name", PORTS)
 def test_port_and_mujoco_in_c_stay_within_their_measured_errors(name: str) -> None:
     """A four-bar with balls over 0.05 s at steps of 1 ms. Errors from the judge's truth are at most ten times
     the measured 8.2e-9 of MuJoCo in C, 6.1e-6 of MJX and 1.4e-7 of Warp, of the length or rad."""
-    if not is_installed(MODULES[name]):
-        pytest.skip(f"{MODULES[name]} is not installed")
+    if not installed(name):
+        pytest.skip(f"{name} is not installed")
     scene = Scene.from_file(FOLDER / "ball_four_bar.toml").with_(duration=0.05)
     times, setting = np.linspace(0, scene.duration, 11), Setting("stock", {"step": 1e-3})
     exact = truth_for(scene).poses(times)
@@ -78,14 +71,14 @@ SINGLE = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", MODULES)
+@pytest.mark.parametrize("name", PORTS)
 @pytest.mark.parametrize("mechanism", APART)
 def test_single_and_double_precision_differ_by_rounding(name: str, mechanism: str) -> None:
     """The port in one precision and the port, or MuJoCo in C, in the other. A difference above ten times the
     measured one (APART) is a defect of the port; one below 1e-9, less than single precision's rounding, means
     that both are double."""
-    if not is_installed(MODULES[name]):
-        pytest.skip(f"{MODULES[name]} is not installed")
+    if not installed(name):
+        pytest.skip(f"{name} is not installed")
     column = next(column for column in DIFFICULTIES if column.scene == mechanism)
     scene, times = column.make().with_(duration=0.2), np.array([0.0, 0.1, 0.2])
     runs = [
@@ -118,12 +111,12 @@ def apart(one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarra
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["mujoco", *MODULES])
+@pytest.mark.parametrize("name", ["mujoco", *PORTS])
 def test_port_moves_loads_couplings_and_armatures_as_the_reference(name: str) -> None:
     """Every body's error is below 1e-3 of the effect that its loads, couplings and armatures have on it, by
     the reference with and without them. A lost part leaves 1, a wrong ratio its relative error; single
     precision and the stiffness of couplings leave 3e-5."""
-    if not is_installed(MODULES.get(name, name)):
+    if not installed(name):
         pytest.skip(f"{name} is not installed")
     probes = {probe.name: probe for kind, probe in feature_scenes().items() if kind.endswith(" load")}
     scene = side_by_side(probes | {make.__name__: make() for make in COUPLED}, GRAVITY)

@@ -67,8 +67,9 @@ def errors(scene: Scene, found: Reference, exact: Trajectory) -> np.ndarray:
 
 
 def test_bound_of_a_mechanism_far_from_the_origin_holds_the_rounding_of_its_samples():
-    """A pendulum 1e6 m from the origin: its samples in extended precision are rounded to doubles, by up to
-    1e-10 of its length, which is more than 1e-12; the bound is larger than that, and below 1e-9."""
+    """A pendulum 1e6 m from the origin: rounded to doubles, its samples lose up to 1e-10 of its length, here
+    more than 1e-12. One motion stands for all runs of the reference, so that they do not differ: the bound
+    covers the loss alone, and is below 1e-9."""
     scene, _ = pendulum()
     far = Isometry(np.eye(3), np.array([1e6, 0.0, 0.0])).change(scene)
     motion = natural_motion(far, [0.0, 0.4, 0.8], EXTENDED, seconds=SECONDS)
@@ -86,7 +87,8 @@ def test_bound_of_a_mechanism_far_from_the_origin_holds_the_rounding_of_its_samp
 )
 def test_reference_is_within_its_bound_of_a_known_motion(name):
     """The error is the difference from the closed form. The bound is at most 1e-12 of the length or rad, or
-    4e-10 for motions over singular positions (SINGULAR), which magnify rounding."""
+    4e-10, ten times the largest measured, for motions over singular positions (SINGULAR), which magnify
+    rounding."""
     scene = ALL[name]
     found, reason = samples(scene, BRIEF.get(name, scene.duration))
     truth = closed_form(scene)
@@ -126,7 +128,8 @@ def test_panels_of_a_stiff_governor_are_as_long_as_its_smooth_motion_allows():
 
 def test_choice_of_rows_moves_contradicting_joints_by_rounding_only():
     """Bennett's linkage with rounded axes, in formulation B: another seed selects other rows and displaces
-    joints by 2e-16, and the motion differs by at most 1e-14; an equal seed gives it to the last bit."""
+    joints by 2e-16. The motion differs, by more than 1e-17 and at most 50 times the displacement, 1e-14; an
+    equal seed gives it to the last bit."""
     scene = Isometry(ASKEW, np.array([0.3, -0.5, 0.2])).change(SCENES["bennett"]())
     one, same, other = (
         tree_motion(scene, [0.5], EXTENDED, seconds=SECONDS, seed=seed, displaced=displaced)
@@ -189,7 +192,8 @@ def test_twenty_digits_are_certified_by_both_formulations():
     ],
 )
 def test_thirty_digits_and_extended_precision_move_alike(make, times):
-    """Formulation A in 30 and in 19 digits: positions agree to 1e-15 m, whatever the loads and joints."""
+    """Formulation A in 30 and in 19 digits: rounded to doubles, positions up to 1 m agree to 1e-15 m,
+    whatever the loads and joints."""
     pytest.importorskip("flint", reason="python-flint is the extra `certify`")
     scene = make()
     motion = natural_motion(scene, times, many_digits(30), order=30, tolerance=1e-20, seconds=SECONDS)

@@ -46,7 +46,8 @@ LABELS = {"engine": "e", "version": "1", "method": "m", "settings": {}}
 
 
 def test_run_that_fails_keeps_its_samples_and_states_the_reason():
-    """One run fails at 0.75 s between its samples 0.5 s and 2 s; another has no finite position at 2 s."""
+    """Samples are wanted at 0, 0.5 and 2 s. One run fails at 0.75 s by its step; another has no finite
+    position at 2 s. Both keep the two samples before."""
 
     def advance(t0: float, t1: float) -> None:
         if t1 > 1.0:

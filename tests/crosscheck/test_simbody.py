@@ -34,6 +34,7 @@ def simulate(scene, duration, accuracy, family="merson", samples=6):
         ("four_bar", 0.012, ROUNDING),
         ("five_bar", 0.012, ROUNDING),
         ("four_bar_gravity", 0.15, 9.2e-11),
+        ("planar_slider_crank_equal", 0.06, 5.6e-10),  # singular at 0.0612 s
     ],
 )
 def test_simbody_stays_within_its_measured_error_of_the_truth(name, duration, measured) -> None:
@@ -95,12 +96,3 @@ def test_simbody_refuses_a_driver_by_polynomial_and_sine_at_once() -> None:
     scene = prescribed(Driver(joint="cyl", polynomial=(0.0, 1.0), sine=sine))
     refusal = engine("simbody").cannot(scene)
     assert refusal is not None and refusal.owner is Owner.ENGINE and "cyl" in refusal.reason, refusal
-
-
-def test_simbody_is_accurate_up_to_the_singular_position() -> None:
-    """Crank and rod of equal length: the crank is at right angles to the slider's line, where it is singular,
-    at 0.0612 s. At the samples to 0.06 s the error from the closed form is at most ten times the measured
-    1.8e-11 m or rad."""
-    scene = SCENES["planar_slider_crank_equal"]()
-    run = simulate(scene, 0.06, 1e-10, samples=13)
-    assert completed_error(run, scene) < MARGIN * 1.8e-11

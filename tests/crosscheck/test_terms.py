@@ -2,13 +2,12 @@
 
 import functools
 import math
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
 
 from crosscheck.conformance.mechanisms.moving import dead_end, moving_probes
-from crosscheck.engine import Setting, engine
+from crosscheck.engine import Setting, engine, installed
 from crosscheck.judge.constraints import initial_poses, initial_twists, scene_length
 from crosscheck.judge.gauss_principle import gauss, stacked
 from crosscheck.judge.metrics import error_series, violation_series
@@ -20,14 +19,11 @@ from mbref.scenes import SCENES
 from tests.crosscheck.measured import MARGIN
 from tests.crosscheck.tree_scenes import driven, every_joint, ring
 
-MODULES = {"drake": "pydrake", "dart": "dartpy", "bullet": "pybullet"}
-MISSING = {name: f"{module} is not installed" for name, module in MODULES.items() if not find_spec(module)}
-
 
 def of(name: str, *values: object) -> object:
     """A parameter of a test, skipped where the engine is not installed."""
-    why = MISSING.get(name, "")
-    return pytest.param(name, *values, marks=pytest.mark.skipif(bool(why), reason=why))
+    why = f"{name} is not installed"
+    return pytest.param(name, *values, marks=pytest.mark.skipif(not installed(name), reason=why))
 
 
 def own_step(name: str, step: float) -> Setting:
