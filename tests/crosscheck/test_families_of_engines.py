@@ -90,10 +90,6 @@ KINEMATIC = "ondsel"  # moves scenes whose whole motion is driven
 WITHOUT_RUNS = "casadi"  # its sweep runs compiled code, and that not beside OpenSim
 
 
-def is_served(name: str, scene: str) -> bool:
-    return engine(name).cannot(SCENES[scene]()) is None
-
-
 @pytest.mark.parametrize("name", [n for n in engine_names() if n != WITHOUT_RUNS])
 def test_families_are_swept_from_coarse_to_fine(name: str) -> None:
     """Within a family that serves the scene one option (step, tolerance, accuracy) falls over three settings
@@ -101,7 +97,7 @@ def test_families_are_swept_from_coarse_to_fine(name: str) -> None:
     if not installed(name):
         pytest.skip(f"{name} is not installed")
     simulator, count = engine(name), 0
-    for scene in filter(lambda scene: is_served(name, scene), SWEPT):
+    for scene in (scene for scene in SWEPT if simulator.cannot(SCENES[scene]()) is None):
         settings = simulator.settings(SCENES[scene]())
         for family in dict.fromkeys(s.family for s in settings):
             found = [s.options for s in settings if s.family == family]

@@ -57,19 +57,13 @@ for one in tomllib.loads(Path(__file__).with_name("defects_of_adapters.toml").re
     DEFECTS[one.pop("way")].append(one)
 
 
-IN_GATE = ("mujoco", "pinocchio", "exudyn")
-
-
-def is_slow(way: str, defect: dict[str, str]) -> bool:
-    """Return whether a defect is left to `make deep`: all except a sign of a load in three adapters."""
-    return way not in IN_GATE or defect != next(one for one in DEFECTS[way] if one["kind"] == LOAD)
-
-
+QUICK = [  # the other defects are left to `make deep`
+    next(one for one in DEFECTS[way] if one["kind"] == LOAD) for way in ("mujoco", "pinocchio", "exudyn")
+]
 CASES = [
     pytest.param(
-        way,
-        defect,
-        marks=[pytest.mark.slow] * is_slow(way, defect),
+        *(way, defect),
+        marks=[pytest.mark.slow] * (defect not in QUICK),
         id=f"{way}: {defect['kind']}, {defect['text'][:30]}",
     )
     for way, found in DEFECTS.items()
