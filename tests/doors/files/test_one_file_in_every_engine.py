@@ -67,13 +67,11 @@ def without(kind: str, name: str) -> Callable[[Machine], Machine]:
     return lambda m: replace(m, **{kind: tuple(p for p in getattr(m, kind) if p.name != name)})
 
 
-TURNED = ((0.04, 0.0, 0.0), (0.0, 0.03, 0.0), (0.0, 0.0, 0.02))
+TURNED = ((0.04, 0.0, 0.0), (0.0, 0.03, 0.0), (0.0, 0.0, 0.02))  # kg m²; x and y are exchanged
 PLANTED = {  # part, name and field of a difference, and its planting
     ("body", "upper", "mass"): named("bodies", "upper", mass=2.001),
     ("body", "lower", "centre"): named("bodies", "lower", centre=(0.0, 0.001, 1.0)),
-    ("body", "other", "inertia"): named(
-        "bodies", "other", inertia=((0.04, 0, 0), (0, 0.03, 0), (0, 0, 0.02))
-    ),
+    ("body", "other", "inertia"): named("bodies", "other", inertia=TURNED),
     ("body", "lower", "body"): without("bodies", "lower"),
     ("joint", "shoulder", "axis"): named("joints", "shoulder", axis=(0.0, -1.0, 0.0)),
     ("joint", "elbow", "axis"): named("joints", "elbow", axis=(0.0, 2.0, 0.0)),
@@ -121,6 +119,7 @@ def test_own_import_builds_the_machine_of_each_file_of_the_corpus(step: int, tmp
 
 @pytest.mark.parametrize("planted", PLANTED, ids=" ".join)
 def test_planted_difference_is_named_by_part_and_field(planted: tuple[str, str, str], tmp_path: Path):
+    """One field of one part of the file's machine is changed; ``planted`` names part and field."""
     machine = meant(written(tmp_path, LOOP), MJCF)
     found = of_reading(matched(machine, PLANTED[planted](machine), DOUBLE), DOUBLE)
     assert [(d.part, d.name, d.field) for d in found] == [planted]
@@ -145,7 +144,8 @@ def renamed(pair_of_bodies: tuple[str, str]) -> Any:
 
 
 def test_mass_matrix_and_gravity_torques_are_mujocos_at_four_poses(tmp_path: Path):
-    """MuJoCo's own terms agree with those of the neutral form; 0.1 kg m² more armature differ."""
+    """MuJoCo's own matrices and torques agree with those of the neutral form, the machine of the file; 0.1
+    kg m² more armature of the elbow is named as a difference of the mass matrix."""
     path = written(tmp_path, LOOP.replace('name="elbow"', 'name="elbow" armature="0.5"'))
     machine, gravity = meant(path, MJCF), (1.0, 2.0, -9.0)
     asked = poses(machine, size_of(machine))
@@ -172,25 +172,38 @@ TREES = {
 }
 
 
-@pytest.mark.parametrize("what", [*TREES, "connect", "joint"])
-def test_rows_and_accelerations_are_mujocos_and_an_engine_without_dampers_is_named(what, tmp_path):
-    """MuJoCo's own terms at random states, with a spring and dampers, and without these, in trees, also with
-    a ball and a free joint, with a loop and with a coupling."""
-    if what in TREES:
-        text = carried_by(TREES[what])
-    else:
-        text = one_equality(what).replace('name="elbow"', 'name="elbow" damping="0.3"')
+DAMPED = {  # trees, also with a ball and a free joint, a loop and a coupling, each with dampers
+    **{name: carried_by(joint) for name, joint in TREES.items()},
+    **{
+        kind: one_equality(kind).replace('"elbow"', '"elbow" damping="0.3"', 1)
+        for kind in ("connect", "joint")
+    },
+}
+
+
+@pytest.mark.parametrize("is_damped", [True, False], ids=["its file", "a file without dampers"])
+@pytest.mark.parametrize("text", DAMPED.values(), ids=DAMPED)
+def test_mujoco_accelerates_as_the_file_and_dampers_it_does_not_read_are_named(text, is_damped, tmp_path):
+    """Accelerations at random states, as MuJoCo finds them. It reads the file, or one from which the dampers
+    are taken away: then the joints with dampers are named, and the field damping. 1e-9 is the error of
+    differences of order four."""
     file = file_of(written(tmp_path, text))
-    assert len(file.asked.starts) == 1 and len(file.asked.closed) == (0 if what in TREES else 4)
+    read = text if is_damped else re.sub(' damping="[^"]*"', "", text)
+    engine = Mujoco().load(written(tmp_path, read, "engine.xml"), MJCF)
+    own = [engine.accelerations(*state, file.asked.gravity) for state in file.asked.states]
     match = matched(file.machine, file.machine, DOUBLE)
-    dampers = {joint.name for joint in file.machine.joints if joint.damping}
-    for text_of_engine, said in ((text, set()), (re.sub(' damping="[^"]*"', "", text), dampers)):
-        engine = Mujoco().load(written(tmp_path, text_of_engine, "engine.xml"), MJCF)
-        rows = [engine.rows(pose) for pose in file.asked.closed]
-        assert of_rows(match, rows, file.asked.closed, ROUNDING * 1e3) == []  # poses are closed to 1e-11
-        own = [engine.accelerations(*state, file.asked.gravity) for state in file.asked.states]
-        found = of_values(match, own, file.accelerations, "acceleration", 1e-9)  # differences of order four
-        assert {d.name for d in found} == said and {d.field for d in found} <= {"damping"}
+    found = of_values(match, own, file.accelerations, "acceleration", 1e-9)
+    dampers = {(joint.name, "damping") for joint in file.machine.joints if joint.damping}
+    assert own and dampers and {(d.name, d.field) for d in found} == (set() if is_damped else dampers)
+
+
+@pytest.mark.parametrize("kind", ["connect", "joint"])
+def test_constraint_rows_of_mujoco_are_the_files_at_four_closed_poses(kind, tmp_path):
+    """The file has a loop or a coupling of joints. Poses are closed to 1e-11; 1e-9 is allowed."""
+    file = file_of(path := written(tmp_path, DAMPED[kind]))
+    rows = [Mujoco().load(path, MJCF).rows(pose) for pose in file.asked.closed]
+    match = matched(file.machine, file.machine, DOUBLE)
+    assert len(rows) == 4 and of_rows(match, rows, file.asked.closed, 1e3 * ROUNDING) == []
 
 
 @pytest.mark.parametrize("what", [pytest.param("ball", marks=pytest.mark.slow), "free", "connect", "joint"])
@@ -234,20 +247,29 @@ def test_rows_that_do_not_hold_the_loop_are_named(arm, change, name, field, tmp_
     assert (name, field) in [(d.name, d.field) for d in found]
 
 
-def test_verdict_names_what_is_dropped_and_whether_the_reader_says_so(tmp_path: Path, capsys: Any):
-    """The reader leaves out mimics with a message, and friction without one; the exit status is 1."""
+def read_without_mimics(folder: Path, capsys: Any) -> dict[str, Any]:
+    """Return the JSON of `crosscheck files`, with exit status 1, for a reader that leaves out mimics with a
+    message, and friction without one."""
     case = next(case for case in CASES if (case.form, case.name) == (URDF, "mimic offset"))
     text = case.text.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><dynamics friction="0.2"/>', 1)
-    path = written(tmp_path, text, "robot.urdf")
+    path = written(folder, text, "robot.urdf")
     assert main(["files", str(path), "--engine", f"{READERS}:Uncoupled", "--json"]) == 1
-    printed = json.loads(capsys.readouterr().out)
-    (found,) = printed["readers"]
+    return json.loads(capsys.readouterr().out)
+
+
+def test_pictures_of_a_reader_show_the_file_beside_the_machine_that_was_read(tmp_path: Path, capsys: Any):
+    """The second panel has the name of each joint, though the joints are no longer coupled."""
+    printed = read_without_mimics(tmp_path, capsys)
     (pictures,) = [block for block in blocks(printed) if isinstance(block, Moving)]
     assert [title for title, _ in pictures.panels] == ["the file", "uncoupled"]
     assert all(f">{name}<" in pictures.panels[1][1] for name in ("shoulder", "elbow", "wrist"))
-    assert found["grade"] == "another machine" and found["messages"] == [
-        "mimic of joint 'wrist' is not supported"
-    ]
+
+
+def test_verdict_names_what_is_dropped_and_whether_the_reader_says_so(tmp_path: Path, capsys: Any):
+    """Of a URDF file, friction is dropped without a message, and a mimic joint with one."""
+    (found,) = read_without_mimics(tmp_path, capsys)["readers"]
+    assert found["grade"] == "another machine"
+    assert found["messages"] == ["mimic of joint 'wrist' is not supported"]
     assert "friction of joint shoulder (0.2) dropped without a message" in found["verdict"]
     assert "wrist follows nothing (wrist = 0.3 + -1 elbow), dropped with a message" in found["verdict"]
 
@@ -263,11 +285,13 @@ def test_advice_was_tried_and_refusals_have_the_readers_message(tmp_path: Path, 
 
 
 def test_joint_without_limits_has_null_in_the_json_document(tmp_path: Path):
+    """JSON has no infinity; no joint of LOOP has limits."""
     found = json.loads(json.dumps(document(file_of(written(tmp_path, LOOP)), [], []), allow_nan=False))
     assert {joint["upper"] for joint in found["machine"]["joints"]} == {None}
 
 
 def test_file_whose_links_are_no_tree_is_refused_in_a_sentence(tmp_path: Path, capsys: Any):
+    """Two links without a joint are two roots."""
     bad = written(tmp_path, "<robot><link name='a'/><link name='b'/></robot>", "bad.urdf")
     assert main(["files", str(bad)]) == 2
     assert "the links are no tree with one root: a, b" in capsys.readouterr().err

@@ -55,7 +55,8 @@ def test_a_joint_without_a_pose_is_at_its_child_link_whatever_its_name(files, na
     ],
 )
 def test_an_axis_is_in_the_frame_of_the_model_by_the_rule_of_its_version(files, version, given, axis):
-    """The link is turned by π/2 about z. Version 1.7 took the element away: its file's note says so."""
+    """Up to version 1.4 an axis was in the model's frame, later in the joint's, here turned by π/2 about z,
+    unless use_parent_model_frame said otherwise. Version 1.7 took this element away, which a note says."""
     arm = link("arm", f"0.5 0 0 0 0 {math.pi / 2!r}")
     shoulder = joint("shoulder", "revolute", "world", "arm", "1 0 0", inside=given)
     scene, notes = files.scene(sdf(arm, shoulder, version=version), "arm.sdf")
@@ -82,17 +83,16 @@ def test_a_screw_moves_by_its_pitch_a_turn(files, more, metres_a_turn):
     assert moved == pytest.approx(metres_a_turn * turned / (2 * math.pi), rel=1e-9)  # rtol of the run
 
 
+def pair(mimic: str, inertia: str = INERTIA) -> str:
+    """Return a file of two links on hinges, lead and follow, of which the second has a mimic element."""
+    joints = joint("lead", "revolute", "world", "a"), joint("follow", "revolute", "world", "b", inside=mimic)
+    return sdf(link("a", inertia=inertia), link("b", "1 0 0 0 0 0", inertia), *joints)
+
+
 def test_joints_of_a_mimic_with_an_offset_start_at_angles_that_obey_it(files):
     """The format: follower = multiplier (leader - reference) + offset, here -1.5 (q + 0.4) + 0.2, in rad."""
-    mimic = mimics("lead", -1.5, 0.2, -0.4)
     arm = "<inertial><pose>0.2 0 0 0 0 0</pose><mass>1</mass></inertial>"
-    text = sdf(
-        link("a", inertia=arm),
-        link("b", "1 0 0 0 0 0", inertia=arm),
-        joint("lead", "revolute", "world", "a"),
-        joint("follow", "revolute", "world", "b", inside=mimic),
-    )
-    scene, out = files.scene(text, "pair.sdf")
+    scene, out = files.scene(pair(mimics("lead", -1.5, 0.2, -0.4), arm), "pair.sdf")
     assert "follow mimics lead with an offset of -0.4" in out
     start = mbref.assembled(scene)
     angles = [2 * math.atan2(body.orientation[3], body.orientation[0]) for body in start.body]
@@ -105,14 +105,7 @@ def test_joints_of_a_mimic_with_an_offset_start_at_angles_that_obey_it(files):
 )
 def test_an_offset_of_a_mimic_joint_that_is_only_rounding_is_exactly_zero(files, ratio, reference, offset):
     """The coupling's offset is offset - ratio · reference, here only rounding of binary numbers."""
-    mimic = mimics("a", ratio, offset, reference)
-    text = sdf(
-        link("p"),
-        link("q"),
-        joint("a", "revolute", "world", "p"),
-        joint("b", "revolute", "world", "q", inside=mimic),
-    )
-    scene, _ = files.scene(text, "pair.sdf")
+    scene, _ = files.scene(pair(mimics("lead", ratio, offset, reference)), "pair.sdf")
     assert scene.coupling[0].offset == 0.0
 
 
@@ -139,9 +132,8 @@ def hanging(limit: str, kind: str = "revolute") -> str:
     """A body that gravity turns about y towards larger angles, or that falls along -z."""
     axis, at = ("0 1 0", "0.3 0 0 0 0 0") if kind == "revolute" else ("0 0 1", "0 0 0 0 0 0")
     body = f"<inertial><pose>{at}</pose><mass>1</mass></inertial>"
-    return sdf(
-        link("a", inertia=body), joint("j", kind, "world", "a", axis, inside=f"<limit>{limit}</limit>")
-    )
+    held = joint("j", kind, "world", "a", axis, inside=f"<limit>{limit}</limit>")
+    return sdf(link("a", inertia=body), held)
 
 
 @pytest.mark.parametrize(
@@ -177,29 +169,19 @@ def test_a_limit_that_acts_at_the_start_is_refused_or_left_out_on_request(files,
 
 def test_elements_that_are_not_read_are_listed_with_their_part(files):
     """<hovers> is no element of the format; <physics> has options of another solver."""
-    text = sdf(
-        link("a").replace("<inertial>", "<hovers>1</hovers><inertial>"),
-        joint(
-            "j", "revolute", "world", "a", more="<physics><ode><cfm_damping>1</cfm_damping></ode></physics>"
-        ),
-    )
-    _, out = files.scene(text, "a.sdf")
+    solver = "<physics><ode><cfm_damping>1</cfm_damping></ode></physics>"
+    arm = link("a").replace("<inertial>", "<hovers>1</hovers><inertial>")
+    _, out = files.scene(sdf(arm, joint("j", "revolute", "world", "a", more=solver)), "a.sdf")
     assert "left out: <hovers> of link 'a': is not read" in out
     assert "left out: <physics> of joint 'j': is not read" in out
 
 
 def test_a_chain_of_2000_frames_is_followed_to_its_end(files):
     """Each frame is 1 mm from the next one: the link is at 2 m."""
-    frames = "".join(
-        f"<frame name='f{k}'><pose relative_to='f{k + 1}'>0.001 0 0 0 0 0</pose></frame>" for k in range(2000)
-    )
-    text = sdf(
-        "<frame name='f2000'/>",
-        frames,
-        "<link name='a'><pose relative_to='f0'/></link>",
-        joint("j", "revolute", "world", "a"),
-        version="1.9",
-    )
+    frame = "<frame name='f{}'><pose relative_to='f{}'>0.001 0 0 0 0 0</pose></frame>"
+    frames = ["<frame name='f2000'/>", *(frame.format(k, k + 1) for k in range(2000))]
+    arm = "<link name='a'><pose relative_to='f0'/></link>"
+    text = sdf(*frames, arm, joint("j", "revolute", "world", "a"), version="1.9")
     scene, _ = files.scene(text, "far.sdf")
     rounding = 2000 * 2.2e-16 * 2.0  # m: 2000 sums of up to 2 m
     assert np.allclose(scene.body[0].position, [2.0, 0.0, 0.0], rtol=0, atol=rounding)

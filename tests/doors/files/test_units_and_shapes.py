@@ -123,6 +123,7 @@ def test_every_number_may_have_a_unit_except_directions_and_pure_numbers():
     ],
 )
 def test_unit_of_another_quantity_is_refused_with_the_field(path, value, message):
+    """Each field of the press takes units of one quantity; times of a table increase in any unit."""
     with pytest.raises(SceneError, match=message):
         PRESS.with_(path, value)
 
@@ -180,6 +181,7 @@ def test_moments_of_a_rod_are_those_of_a_line():
 
 BALL = {"type": "sphere", "radius": 1}
 ROD = {"type": "rod", "axis": "x", "length": 1}
+NO_WALL = {"type": "tube", "radius": 0.1, "inner_radius": 0.1}
 
 
 @pytest.mark.parametrize(
@@ -188,10 +190,7 @@ ROD = {"type": "rod", "axis": "x", "length": 1}
         ({"shape": {"type": "ball", "radius": 1}, "mass": 1}, "shape.type: must be one of 'box', 'sphere'"),
         ({"shape": {"type": "box", "size": [1, 1, "0 mm"]}, "mass": 1}, r"shape.size\[2\]: must be positive"),
         ({"shape": {"type": "rod", "length": 1}, "mass": 1}, "shape.axis: is required"),
-        (
-            {"shape": {**ROD, "type": "tube", "radius": 0.1, "inner_radius": 0.1}, "mass": 1},
-            "less than radius",
-        ),
+        ({"shape": {**ROD, **NO_WALL}, "mass": 1}, "less than radius"),
         ({"shape": BALL}, "mass: is missing; a shape needs mass or density"),
         ({"shape": BALL, "mass": 1, "density": 1}, "density, not both"),
         ({"shape": BALL, "mass": 1, "inertia": [1, 1, 1]}, "inertia: follows from the shape"),
@@ -200,5 +199,6 @@ ROD = {"type": "rod", "axis": "x", "length": 1}
     ],
 )
 def test_shape_that_gives_no_inertia_is_refused(fields, message):
+    """An unknown shape, a size of zero, a missing field, mass and density at once or neither of them."""
     with pytest.raises(SceneError, match=r"body\[b\]\..*" + message):
         Scene(name="s", body=[{"name": "b", "position": [0, 0, 0], **fields}])

@@ -11,8 +11,10 @@ from mbref.design.assemble import assemble
 from mbref.design.exchange import exchanges
 from mbref.equations.counts import counts
 from mbref.equations.model import Model
-from mbref.scene import Body, Coupling, Driver, Revolute, Scene, SceneError, TorsionSpring
+from mbref.scene import Coupling, Driver, Scene, SceneError, TorsionSpring
 from mbref.scenes import find_scene
+from tests.helpers.parts import hinge
+from tests.helpers.statics import rod
 
 SPATIAL = ("bennett", "spatial_slider_crank", "sarrus", "andrews_squeezer")
 ROUNDING = 1e-12  # m or rad, of lengths of about 0.5 m after 20 partial displacements
@@ -37,12 +39,10 @@ def test_assembled_four_bar_has_the_requested_lengths_and_its_changes_are_listed
     for pair, d in wanted.items():
         assert length(found.scene, *pair) == pytest.approx(d, abs=ROUNDING)
         assert found.lengths[f"{pair[0]}–{pair[1]}"] == pytest.approx((0.5, d), abs=ROUNDING)
-    assert found.joints["C"] == pytest.approx(
-        math.dist(found.scene.joint[2].anchor, find_scene("four_bar_gravity").joint[2].anchor)
-    )
-    crank = found.scene.body[0]
+    before, after = (scene.joint_named("C").anchor for scene in (find_scene("four_bar_gravity"), found.scene))
+    assert found.joints["C"] == pytest.approx(math.dist(before, after))
     middle = np.mean([found.scene.joint_named(j).anchor for j in "AB"], axis=0)
-    assert np.allclose(crank.position, middle, atol=ROUNDING), "the centre of mass is no longer in the middle"
+    assert np.allclose(found.scene.body[0].position, middle, atol=ROUNDING)
 
 
 def test_a_spatial_slider_crank_closes_with_a_longer_rod():
@@ -75,6 +75,8 @@ def test_assembly_of_a_closed_loop_without_requested_lengths_leaves_it_in_place_
     ],
 )
 def test_impossible_length_or_pair_of_joints_is_refused(pair, size, says):
+    """Links of 0.5 m close no loop with one of 5 m; there is no joint X, and A and C are ends of a
+    diagonal."""
     with pytest.raises(SceneError, match=says):
         assemble(find_scene("four_bar_gravity"), {pair: size})
 
@@ -90,6 +92,7 @@ def four_bar_with_flag() -> Scene:
 
 
 def test_plate_gets_the_lengths_of_its_three_sides():
+    """The sides 0.5, 0.35 and 0.25 m are between its hinges A, B and P."""
     sides = {("A", "B"): 0.5, ("A", "P"): 0.35, ("B", "P"): 0.25}
     found = assemble(four_bar_with_flag(), sides).scene
     assert violation(found) < ROUNDING
@@ -97,6 +100,7 @@ def test_plate_gets_the_lengths_of_its_three_sides():
 
 
 def test_sides_that_violate_the_triangle_inequality_are_refused():
+    """0.5 m > 0.1 m + 0.2 m."""
     with pytest.raises(SceneError, match=r"body\[crank\]: no link has these lengths"):
         assemble(four_bar_with_flag(), {("A", "B"): 0.5, ("A", "P"): 0.1, ("B", "P"): 0.2})
 
@@ -120,13 +124,9 @@ BALL, LINE = "spherical", "inline"
 
 def test_one_of_two_hinges_is_removed_unless_something_acts_on_it():
     """A pendulum on two hinges of one axis: 10 rows of rank 5, as a ball and a point on a line have."""
-    door = Body(name="door", mass=1.0, inertia=(0.1, 0.2, 0.3), position=(0.5, 0.0, 0.0))
-    hinges = [
-        Revolute(name=name, bodies=("ground", "door"), anchor=(0.0, 0.0, z), axis=(0.0, 0.0, 1.0))
-        for name, z in (("lower", 0.0), ("upper", 1.0))
-    ]
+    hinges = [hinge(name, "ground", "door", (0.0, 0.0, z)) for name, z in (("lower", 0.0), ("upper", 1.0))]
     for ground in ("frame", "body"):
-        twice = Scene(name="door", ground=ground, body=(door,), joint=tuple(hinges))
+        twice = Scene(name="door", ground=ground, body=[rod("door", (0.5, 0.0, 0.0))], joint=hinges)
         pairs = [{"lower": one, "upper": other} for one, other in ((BALL, LINE), (LINE, BALL))]
         assert exchanges(twice) == [*pairs, {"lower": "removed"}, {"upper": "removed"}]
         driven = twice.with_(driver=(Driver(joint="upper", polynomial=(0.0, 1.0)),))
@@ -140,17 +140,11 @@ def test_one_of_two_hinges_is_removed_unless_something_acts_on_it():
 )
 def test_only_the_other_of_two_hinges_is_removed_if_one_has_an_armature_or_a_coupling(armature, coupling):
     """A door on two hinges of one axis; the upper one has an armature, or is geared to a wheel."""
-    bodies = [
-        Body(name=name, mass=1.0, inertia=(0.1, 0.2, 0.2), position=(0.5, 0.0, 0.0))
-        for name in ("door", "wheel")
-    ]
+    bodies = [rod(name, (0.5, 0.0, 0.0)) for name in ("door", "wheel")]
     hinges = [
-        Revolute(name=name, bodies=("ground", body), anchor=(0.0, 0.0, z), axis=(0.0, 0.0, 1.0), armature=a)
-        for name, body, z, a in (
-            ("lower", "door", 0.0, 0.0),
-            ("upper", "door", 1.0, armature),
-            ("W", "wheel", 0.0, 0.0),
-        )
+        hinge("lower", "ground", "door", (0.0, 0.0, 0.0)),
+        hinge("upper", "ground", "door", (0.0, 0.0, 1.0), armature=armature),
+        hinge("W", "ground", "wheel", (0.0, 0.0, 0.0)),
     ]
     scene = Scene(name="doors", body=bodies, joint=hinges, coupling=coupling)
     assert exchanges(scene, most=20) == [{"lower": "removed"}]
@@ -187,13 +181,7 @@ def test_driver_of_a_locked_loop_is_refused_at_the_start():
 def tilted_at_rest(scene, tilt):
     """Return the four-bar at rest with a revolute joint B, its axis (0, tilt, 1)."""
     corner = scene.joint_named("B")
-    revolute = {
-        "name": "B",
-        "type": "revolute",
-        "bodies": corner.bodies,
-        "anchor": corner.anchor_pair[0],
-        "axis": (0.0, tilt, 1.0),
-    }
+    revolute = hinge("B", *corner.bodies, corner.anchor_pair[0], (0.0, tilt, 1.0))
     at_rest = [body.model_copy(update={"velocity": None, "angular_velocity": None}) for body in scene.body]
     return scene.with_(body=at_rest, joint=[revolute if j.name == "B" else j for j in scene.joint])
 

@@ -27,7 +27,8 @@ def diagnosis_of(scene: Scene) -> tuple:
     "seed", [*range(8), *(pytest.param(k, marks=pytest.mark.slow) for k in range(8, 80))]
 )
 def test_rows_redundancy_and_freedoms_equal_the_judges_in_every_unit_of_length(seed):
-    """The judge's `mobility` finds ranks by singular values. In other units the diagnosis is equal."""
+    """The judge's `mobility` finds ranks by singular values. In other units the diagnosis is equal, with the
+    joints of redundant rows and the reactions that are determined."""
     scene = random_mechanism(seed)
     truth, expected = mobility(scene), diagnosis_of(scene)
     counts = expected[0]
@@ -48,9 +49,7 @@ def test_smallest_singular_value_of_built_in_scenes_does_not_depend_on_size(name
 
 
 @pytest.mark.parametrize("size", [1e-6, 0.01, 1e6])
-def test_diagnose_prints_for_every_size_that_a_linkage_keeps_away_from_singular_positions(
-    size, tmp_path, capsys
-):
+def test_diagnose_prints_at_every_size_that_a_linkage_stays_away_from_singularity(size, tmp_path, capsys):
     """A parallelogram whose crank stands at 53 degrees and hardly moves in 0.05 s; its links are of 1 m times
     the size."""
     shown = []
@@ -119,9 +118,7 @@ def test_welded_halves_of_a_rod_between_two_ball_joints_are_named_together(tmp_p
     ("kind", "says"),
     [("translational", "can slide between its joints"), ("cylindrical", "can move alone in 2 ways")],
 )
-def test_sleeve_between_two_guides_of_one_direction_is_named_with_its_ways_to_move(
-    kind, says, tmp_path, capsys
-):
+def test_sleeve_between_two_parallel_guides_is_named_with_its_ways_to_move(kind, says, tmp_path, capsys):
     """The guides are on the ground and on a lever that cannot turn: a motion of the sleeve moves no lever."""
     guide = {"type": kind, "axis": [1.0, 0.0, 0.0]}
     joints = [

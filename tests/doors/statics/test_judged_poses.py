@@ -11,17 +11,11 @@ from tests.helpers.statics import DOWN, G, parallelogram, pendulum, rod, slide
 
 def balance_of_weights() -> Scene:
     """Two equal weights on a rope over a pulley: in balance at every height."""
-    places = ((0.0, 0.0, 0.0), (0.8, -0.2, 0.0))
-    return Scene(
-        name="weights",
-        gravity=DOWN,
-        body=[rod(name, place, 1.5) for name, place in zip("ab", places, strict=True)],
-        joint=[
-            slide(joint, body, place, (0.0, 1.0, 0.0))
-            for joint, body, place in zip("AB", "ab", places, strict=True)
-        ],
-        coupling=[{"name": "rope", "joints": ["A", "B"], "ratio": -1.0}],
-    )
+    places, rope = {"a": (0.0, 0.0, 0.0), "b": (0.8, -0.2, 0.0)}, {"joints": ["A", "B"], "ratio": -1.0}
+    bodies = [rod(name, place, 1.5) for name, place in places.items()]
+    joints = [slide(name.upper(), name, place, (0.0, 1.0, 0.0)) for name, place in places.items()]
+    coupling = [{"name": "rope", **rope}]
+    return Scene(name="weights", gravity=DOWN, body=bodies, joint=joints, coupling=coupling)
 
 
 @pytest.mark.slow

@@ -80,24 +80,18 @@ def test_eigenvalues_of_many_mechanisms_agree_with_the_judges_within_their_bound
     assert max(each.eigenvalues for each in found) <= 1
 
 
+SPRING = {"type": "torsion_spring", "joint": "A", "stiffness": 30.0, "damping": 0.5}
+
+
 @pytest.mark.parametrize(("length", "mass", "time"), [(1e-6, 1.0, 1.0), (1e3, 1e-9, 1e-3), (1e6, 1e9, 1e3)])
 @pytest.mark.parametrize(
-    "scene",
-    [
-        parallelogram(0.6, 0.8),
-        pendulum(load=[{"type": "torsion_spring", "joint": "A", "stiffness": 30.0, "damping": 0.5}]),
-    ],
-    ids=["linkage", "sprung"],
+    "scene", [parallelogram(0.6, 0.8), pendulum(load=[SPRING])], ids=["linkage", "sprung"]
 )
-def test_equilibria_in_other_units_have_proportional_places_and_eigenvalues_by_the_unit_of_time(
-    scene, length, mass, time
-):
+def test_equilibria_in_other_units_have_proportional_places_and_eigenvalues(scene, length, mass, time):
     """Eigenvalues (1/s) times the unit of time agree within the bounds of both, places to 1e-9 m."""
-    found = equilibria(scene, 3)
+    found, others = equilibria(scene, 3), equilibria(in_other_units(scaled(scene, mass), length, time), 3)
     assert found
-    for each, other in zip(
-        found, equilibria(in_other_units(scaled(scene, mass), length, time), 3), strict=True
-    ):
+    for each, other in zip(found, others, strict=True):
         assert each.stability == other.stability
         allowed = (each.bounds + time * other.bounds) + ROUNDED * np.abs(each.eigenvalues).max()
         assert (np.abs(each.eigenvalues - time * other.eigenvalues) <= allowed).all()
