@@ -25,7 +25,7 @@ SCENES = {  # output, and end of the motion (s), before the first singular posit
     "flyball_governor": ("energy", 0.1),
     "sarrus": ("energy", None),
 }
-REPEATS = 5
+REPEATS = 3
 ROUNDING = (
     1e-9  # derivative / largest one, in SI units, below which it is rounding, as by gravity across a plane
 )

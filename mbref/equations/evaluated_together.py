@@ -90,7 +90,7 @@ class Evaluations:
         reference[:] = before
         self._model.put_numbers(memory.values, self._model.data)
         blocks = blocks.reshape(*shape, *columns.shape)
-        phi, nu, gamma = np.split(rows, 3, axis=-1)
+        phi, nu, gamma = rows[..., :m], rows[..., m : 2 * m], rows[..., 2 * m :]
         return Terms(self._model.structure, self._packs.mass[places], blocks, phi, nu, gamma, forces)
 
     def starts(self) -> list[Start | SceneError]:

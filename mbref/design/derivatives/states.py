@@ -121,7 +121,7 @@ class Residuals:
     """Changes of the residuals at k states whose accelerations and multipliers are constant."""
 
     def __init__(self, model: Model, states: States):
-        self.model, self.states = model, states
+        self.model, self.states, self._spring = model, states, shortest_spring(model, states.q)
         fixed, columns = np.zeros((len(states.times), 6)), model.entry_columns  # of the fixed frame
         self._v, self._a = (np.concatenate([w, fixed], axis=1)[:, columns] for w in (states.v, states.a))
         bodies = columns[:, ::6].ravel() // 6
@@ -130,8 +130,9 @@ class Residuals:
     def along(self, x: np.ndarray, step: float) -> np.ndarray:
         """Return the change (k, 3 m + n) by displacements x (k, n), by differences of a step, see
         ``Direction.steps``."""
-        model, states, still = self.model, self.states, np.zeros_like(x)
-        steps = Direction(x, still, still, states.multipliers[:, :0]).steps(states, model, step)[:, None]
+        model, states = self.model, self.states
+        sizes = np.abs(x / model.units).max(axis=1, initial=0.0)
+        steps = (step * self._spring / np.where(sizes > 0.0, sizes, 1.0))[:, None]
 
         def at(h: np.ndarray) -> Terms:
             return terms_along(model, states._replace(q=states.displaced(h * x)))
@@ -142,8 +143,9 @@ class Residuals:
     def by_velocity(self, v: np.ndarray) -> np.ndarray:
         """Return the change (k, 3 m + n) by changes of velocity v (k, n) in γ and g, which are polynomials of
         degree 2; the change of Φ_q v - ν is left out."""
-        still, states = np.zeros_like(v), self.states
-        h = Direction(still, v, still, states.multipliers[:, :0]).steps(states, self.model, 1.0)[:, None]
+        states, sizes = self.states, np.abs(v).max(axis=1, initial=0.0)
+        speed = FAST * np.abs(states.v).max(initial=0.0) or 1.0
+        h = (speed / np.where(sizes > 0.0, sizes, 1.0))[:, None]
         ahead, behind = (terms_along(self.model, states._replace(v=states.v + s * v)) for s in (h, -h))
         gamma, force = (ahead.gamma - behind.gamma) / (2 * h), (ahead.force - behind.force) / (2 * h)
         return np.concatenate([np.zeros((len(v), 2 * self.model.m)), -gamma, -force], axis=1)

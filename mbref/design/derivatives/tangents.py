@@ -22,7 +22,7 @@ MASSLESS = 1e-13  # mass along a freedom / largest one, below which nothing resi
 # share of a number's effect on the constraints that no displacement compensates; accurate rows leave less
 COMPENSATED = 1e-7
 NOISE = 1e-12  # rounding of Φ, lengths of the mechanism or rad
-MOST_ENTRIES = 4_000_000  # numbers at states that are computed together: 32 MB
+MOST_ENTRIES = 500_000  # numbers at states that are computed together: 4 MB, which caches hold
 
 
 class Partition(NamedTuple):
