@@ -151,7 +151,7 @@ def test_module_that_renders_reports_imports_nothing_that_makes_records():
 
 
 def test_program_reports_imports_only_command_line_modules_of_crosscheck():
-    """What runs engines is behind these modules."""
+    """These modules of the command line call what runs engines, so that program reports need not."""
     names = {n for n in of("reports", "reports.__main__") if n.startswith("crosscheck.")}
     allowed = re.compile(r"crosscheck\.cli(\.(collection|options|scene_request|moving_picture)(\.\w+)?)?")
     wrong = sorted(n for n in names if not allowed.fullmatch(n))

@@ -20,7 +20,7 @@ def groups() -> list[SceneRuns]:
 
 
 def test_sections_of_the_committed_report_follow_from_the_stored_records(groups):
-    """Each of more than 100 blocks stands in report.md. The section on reactions, the dearest one, is
+    """Each of more than 100 blocks stands in report.md. The section on reactions, the one that takes longest, is
     rendered by the slow test below."""
     text = (FOLDER / "report.md").read_text()
     names = [name for name in sections.NAMES if name != "reactions"]
