@@ -20,8 +20,8 @@ def groups() -> list[SceneRuns]:
 
 
 def test_sections_of_the_committed_report_follow_from_the_stored_records(groups):
-    """Each of more than 100 blocks stands in report.md. The section on reactions, the one that takes longest, is
-    rendered by the slow test below."""
+    """Each of more than 100 blocks stands in report.md. The section on reactions takes longest: the slow test
+    below renders it."""
     text = (FOLDER / "report.md").read_text()
     names = [name for name in sections.NAMES if name != "reactions"]
     blocks = sections.blocks(groups, names, stored.verified(FOLDER))
