@@ -56,7 +56,9 @@ class Difference:
 
     def __str__(self) -> str:
         first, second = self.engines
-        return f"{self.field}: {first} and {second} differ by {self.by:.3g} (allowed {self.allowed:.0e})"
+        by = f"{self.by:.3g}"
+        by = by if float(by) > self.allowed else repr(float(self.by))  # as many digits as show the excess
+        return f"{self.field}: {first} and {second} differ by {by} (allowed {self.allowed:.0e})"
 
 
 def gate_times(scene: Scene) -> np.ndarray:

@@ -28,9 +28,10 @@ class Processes(Executor):
     def __init__(self, workers: int) -> None:
         self._threads = ThreadPoolExecutor(workers)
         self._end, self._open = Pipe(duplex=False)  # the processes end when the second one is closed
+        self._made = [_Process(self._end) for _ in range(workers)]
         self._idle: SimpleQueue[_Process] = SimpleQueue()
-        for _ in range(workers):
-            self._idle.put(_Process(self._end))
+        for process in self._made:
+            self._idle.put(process)
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
         """Return the future of a call; if its process is killed, its exception is BrokenExecutor."""
@@ -48,6 +49,8 @@ class Processes(Executor):
         """End the processes after their calls, or at once if an exception ends the ``with`` block."""
         if kind is not None:
             self._open.close()
+            for process in self._made:
+                process.kill()  # a process that still imports would not see the end of its pipe for seconds
         self.shutdown(cancel_futures=kind is not None)
 
     def _call(self, function: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
@@ -57,6 +60,7 @@ class Processes(Executor):
         except BrokenExecutor:
             process.end()
             process = _Process(self._end)
+            self._made.append(process)
             raise
         finally:
             self._idle.put(process)
@@ -90,6 +94,11 @@ class _Process:
         of_process.close()
         self._pipe, self._process = pipe, process
         return pipe
+
+    def kill(self) -> None:
+        """End the process at once, so that its call raises BrokenProcessPool."""
+        if self._process:
+            self._process.kill()
 
     def end(self) -> None:
         """End the process, which makes no call."""
