@@ -17,7 +17,7 @@ from tests.doors.derivatives.test_sensitivities import (
 )
 from tests.doors.statics.test_random_equilibria import at_rest
 from tests.helpers.coupled_mechanisms import body
-from tests.helpers.parts import slide
+from tests.helpers.parts import slide, spring
 
 ACCURATE = 1e-10  # relative error that is allowed against closed forms; rounding leaves 1e-12
 
@@ -28,12 +28,10 @@ def carts(masses: list[float], springs: list[tuple], damping: float = 0.0) -> Sc
     bodies = [body(f"c{k}", mass, [0.1] * 3, (float(k), 0.0, 0.0)) for k, mass in enumerate(masses)]
     joints = [slide(f"S{k}", "ground", f"c{k}", bodies[k]["position"]) for k in range(len(masses))]
     place = {f"c{k}": float(k) for k in range(len(masses))}
-    loads = [
-        {"type": "spring", "bodies": [first, second], "natural_length": 1.0, "stiffness": stiffness}
-        | {"points": [[place.get(first, place[second] - 1), 0.0, 0.0], [place[second], 0.0, 0.0]]}
-        | {"damping": damping}
-        for first, second, stiffness in springs
-    ]
+    loads = []
+    for first, second, stiffness in springs:
+        ends = (place.get(first, place[second] - 1), 0.0, 0.0), (place[second], 0.0, 0.0)
+        loads.append(spring(first, ends[0], second, ends[1], stiffness, 1.0, damping))
     return Scene(name="carts", body=bodies, joint=joints, load=loads)
 
 
@@ -57,7 +55,8 @@ def test_eigenvalue_of_a_pendulum_depends_on_its_numbers_as_in_closed_form():
 
 
 def test_eigenvalues_of_two_carts_depend_on_masses_and_springs_as_in_closed_form():
-    """m₁ m₂ s⁴ + ((k + c) m₂ + c m₁) s² + k c = 0, with springs k to the ground and c between the carts."""
+    """m₁ m₂ s⁴ + ((k + c) m₂ + c m₁) s² + k c = 0, with springs k to the ground and c between the carts, is
+    differentiated by a complex step."""
     scene = carts([2.0, 3.0], [("ground", "c0", 50.0), ("c0", "c1", 20.0)])
 
     def rates(m1, m2, k, c):
@@ -94,6 +93,7 @@ def test_repeated_eigenvalue_splits_into_the_slopes_of_its_parts():
 
 
 def test_mechanism_without_a_restoring_force_is_refused_by_name():
+    """A cart without a spring rests everywhere: the eigenvalue 0 of its equilibria is double."""
     with pytest.raises(mbref.InputError, match="a neutral equilibrium"):
         mbref.eigenvalue_sensitivities(carts([2.0], []), ["body[c0].mass"])
 

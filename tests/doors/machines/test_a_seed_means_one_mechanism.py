@@ -70,10 +70,8 @@ def test_mechanisms_do_not_depend_on_the_kernels_of_openblas(kernels):
         pytest.skip(f"this processor does not run the kernels {kernels}")
     test = f"{__file__}::test_mechanisms_of_all_seeds_and_names_equal_the_stored_ones"
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", test]
-    done = subprocess.run(
-        command, cwd=ROOT, env=environment(changes), capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stdout
+    done = subprocess.run(command, cwd=ROOT, env=environment(changes), stdout=subprocess.PIPE, check=False)
+    assert done.returncode == 0, done.stdout.decode()
 
 
 if __name__ == "__main__":

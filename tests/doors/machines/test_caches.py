@@ -76,6 +76,7 @@ def test_file_is_read_as_it_was_written_and_nothing_else_is_left(tmp_path: Path)
     ids=["a byte less", "cut to 10 bytes", "empty", "a byte more", "a bit flipped", "other text"],
 )
 def test_damaged_file_is_reported_removed_and_not_read(damage, tmp_path: Path, capsys):
+    """A file has a checksum of its data, here 50 bytes; some of its bytes are changed, missing or new."""
     path = tmp_path / "a"
     checked_file.write(path, b"data " * 10)
     path.write_bytes(damage(path.read_bytes()))
@@ -85,6 +86,7 @@ def test_damaged_file_is_reported_removed_and_not_read(damage, tmp_path: Path, c
 
 
 def test_unwritable_folder_is_reported_once(tmp_path: Path, capsys):
+    """A file is in the folder's place, and two files cannot be written into it."""
     (tmp_path / "file").write_text("no folder")
     for name in "ab":
         checked_file.write(tmp_path / "file" / name, b"data")
@@ -152,10 +154,6 @@ def ran(script: str, folder: Path, cache: Path) -> tuple[str, str]:
     return done.stdout, done.stderr
 
 
-def files_in(cache: Path, pattern: str) -> list[Path]:
-    return sorted(cache.rglob(pattern))
-
-
 # each damage costs several new processes that compile
 DAMAGES = (
     pytest.param(lambda data: data[: len(data) // 2], id="cut in half"),
@@ -176,14 +174,14 @@ def test_damaged_machine_code_is_reported_compiled_again_and_stored(script, patt
     """Three processes: the first compiles, the second finds files damaged, the third finds them whole."""
     cache = tmp_path / "cache"
     assert ran(script, tmp_path, cache)[0] == says
-    files = files_in(cache, pattern)
+    files = sorted(cache.rglob(pattern))
     assert files
     good = {file: file.read_bytes() for file in files}
     for file in files:
         file.write_bytes(damage(good[file]))
     out, error = ran(script, tmp_path, cache)
     assert out == says and "is damaged and will be written again" in error and "Traceback" not in error, error
-    assert files_in(cache, pattern) == files
+    assert sorted(cache.rglob(pattern)) == files
     out, error = ran(script, tmp_path, cache)
     assert (out, "damaged" in error) == (says, False), error
 
@@ -267,9 +265,7 @@ def test_no_data_are_written_to_or_read_from_a_folder_that_others_can_write(tmp_
 
 
 @pytest.mark.parametrize(
-    ("script", "says"),
-    [(SMALL_KERNEL, "7.0\n"), (SCENE, "True\n")],
-    ids=["code of a kernel", "code of a scene"],
+    ("script", "says"), [(SMALL_KERNEL, "7.0\n"), (SCENE, "True\n")], ids=["kernel", "scene"]
 )
 def test_program_runs_without_a_writable_cache(script, says, tmp_path: Path):
     """A file is in place of the cache's folder."""
@@ -290,6 +286,7 @@ def test_one_of_two_processes_compiles_a_kernel(tmp_path: Path):
 
 @pytest.mark.parametrize("program", ["mbref", "crosscheck"])
 def test_printing_help_creates_no_cache(program, tmp_path: Path):
+    """NUMBA_CACHE_DIR names a folder that is not there before, nor after."""
     command = [sys.executable, "-m", program, "--help"]
     subprocess.run(command, env=compiling(tmp_path / "cache"), cwd=ROOT, capture_output=True, check=True)
     assert not (tmp_path / "cache").exists()

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from crosscheck.judge.energy import kinetic_energy
-from crosscheck.judge.gauss_principle import gauss, stacked
 from mbref import Limits, Motion, Scene, simulate
 from tests.helpers.power_balance import panel_times, unbalanced
 from tests.helpers.powered_mechanisms import powered_mechanism
@@ -39,8 +38,9 @@ def off(motion: Motion) -> float:
     [*((seed, "taylor", 1e-13) for seed in GATE), *((s, m, 1e-12) for s in PLAIN[:2] for m in OTHERS)],
 )
 def test_work_of_drivers_and_loads_is_the_change_of_energy(seed, method, rtol):
-    """E(t) - E(0) = ∫ Σ P dt, by Gauss–Legendre quadrature over three panels of the run's own columns. OTHERS
-    are sparse matrices, partitioning, and Adams's method with feedback."""
+    """E(t) - E(0) = ∫ Σ P dt, by Gauss–Legendre quadrature over three panels of the run's own columns, to
+    BALANCED of the largest power. OTHERS are sparse matrices, partitioning, and Adams's method with
+    feedback."""
     motion = run(powered_mechanism(seed), method, rtol)
     assert motion.outcome.name == "COMPLETED", motion.message
     assert off(motion) < BALANCED
@@ -54,16 +54,6 @@ def test_work_is_the_change_of_energy_of_many_mechanisms(first):
     moved = {seed: imbalance for seed, imbalance in found.items() if not np.isnan(imbalance)}
     assert len(moved) >= MANY - WITHOUT_BALANCE, f"balances from {first} on for {list(moved)} only"
     assert max(moved.values()) < BALANCED, moved
-
-
-@pytest.mark.parametrize("seed", GATE[:10])
-def test_accelerations_at_the_start_obey_gauss_principle_of_the_judge(seed):
-    """The judge minimises the constraint by singular values; the difference is relative to the largest
-    acceleration, with a condition of up to 1e5."""
-    scene = powered_mechanism(seed)
-    exact = gauss(scene)
-    motion = simulate(scene, times=[0.0, 1e-6])
-    assert np.abs(stacked(scene, motion, 0) - exact).max() < 1e-10 * np.abs(exact).max()
 
 
 @pytest.mark.parametrize("seed", PLAIN)

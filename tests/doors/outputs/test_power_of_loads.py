@@ -23,21 +23,23 @@ def swung(*load) -> Motion:
     return simulate(Scene(name="arm", body=[body], joint=joints, driver=driver, load=load), times=TIMES)
 
 
-@pytest.mark.parametrize(("factor", "values"), [({}, np.ones(TIMES.size)), ({"factor": FACTOR}, VALUES)])
+@pytest.mark.parametrize(
+    ("factor", "values"), [({}, 1.0), ({"factor": FACTOR}, VALUES)], ids=["constant", "times 1 - t/2"]
+)
 def test_power_of_a_force_is_force_times_velocity_and_of_a_moment_moment_times_rate(factor, values):
-    """The force acts on the tip, whose velocity is 2 φ' (-sin φ, cos φ); of the moment z counts alone."""
+    """The force (3, -1, 4) N acts on the tip, whose velocity is 2 φ' (-sin φ, cos φ); of the moment, -7 N m
+    about z counts alone."""
     force = {"type": "force", "body": "arm", "point": [2.0, 0.0, 0.0], "force": [3.0, -1.0, 4.0], **factor}
     moment = {"type": "moment", "body": "arm", "moment": [5.0, 6.0, -7.0], **factor}
     motion = swung(force, moment)
     tip = 2.0 * RATE * np.array([-np.sin(ANGLE), np.cos(ANGLE)])
-    assert np.allclose(
-        motion.load_at(0).power, values * (3.0 * tip[0] - tip[1]), rtol=0.0, atol=CLOSE * LARGEST
-    )
-    assert np.allclose(motion.load_at(1).power, -7.0 * values * RATE, rtol=0.0, atol=CLOSE * LARGEST)
+    for k, power in enumerate((3.0 * tip[0] - tip[1], -7.0 * RATE)):
+        assert np.allclose(motion.load_at(k).power, values * power, rtol=0.0, atol=CLOSE * LARGEST)
 
 
 def test_springs_store_half_their_stiffness_times_the_square_of_their_stretch():
-    """The spring from (0, 3) to the tip has the length √(13 - 12 sin φ); dampers store nothing."""
+    """The spring from (0, 3) to the tip has the length √(13 - 12 sin φ): 8 N/m (l - 1.5 m)² / 2 and 4 N m/rad
+    (φ + 20 rad)² / 2. Dampers store nothing."""
     ends = {"bodies": ["ground", "arm"], "points": [[0.0, 3.0, 0.0], [2.0, 0.0, 0.0]]}
     motion = swung(
         {"type": "spring", **ends, "stiffness": 8.0, "damping": 0.3, "natural_length": 1.5},
@@ -51,22 +53,20 @@ def test_springs_store_half_their_stiffness_times_the_square_of_their_stretch():
 
 
 def test_spring_of_a_slide_stores_half_its_stiffness_times_the_square_of_its_stretch():
-    """A driver moves the block to x = 2 t + 1.5 t² m; the spring is relaxed at -0.5 m."""
+    """A driver moves the block by x = 2 t + 1.5 t² m: 8 N/m (x + 0.5 m)² / 2, as the spring is relaxed at
+    -0.5 m."""
     block = {"name": "block", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.8, 0.0, 0.0]}
     spring = {"type": "slide_spring", "joint": "S", "stiffness": 8.0, "damping": 0.3}
-    scene = Scene(
-        name="slide",
-        body=[block],
-        joint=[slide("S", "ground", "block", (0.0, 0.0, 0.0))],
-        driver=[{"joint": "S", "polynomial": [0.0, 2.0, 1.5]}],
-        load=[{**spring, "natural_displacement": -0.5}],
+    joint, load = slide("S", "ground", "block", (0.0, 0.0, 0.0)), {**spring, "natural_displacement": -0.5}
+    driver = [{"joint": "S", "polynomial": [0.0, 2.0, 1.5]}]
+    motion = simulate(
+        Scene(name="slide", body=[block], joint=[joint], driver=driver, load=[load]), times=TIMES
     )
-    motion = simulate(scene, times=TIMES)
     assert np.allclose(motion.load_at(0).energy, 4.0 * (ANGLE + 0.5) ** 2, rtol=CLOSE)
     assert np.allclose(motion.potential_energy, motion.load_at(0).energy, rtol=CLOSE)
 
 
 def test_torque_of_a_joint_has_the_power_torque_times_rate_and_stores_no_energy():
-    """P = 2 (1 - 0.5 t) φ' W."""
+    """The torque is 2 (1 - 0.5 t) N m, its power P = 2 (1 - 0.5 t) φ' W."""
     torque = swung({"type": "joint_torque", "joint": "A", "torque": 2.0, "factor": FACTOR}).load_at(0)
     assert np.allclose(torque.power, 2.0 * VALUES * RATE, rtol=CLOSE) and torque.energy is None

@@ -31,6 +31,7 @@ def test_run_that_reaches_no_sample_prints_its_outcome_and_cause(columns, estima
 
 
 def test_files_of_a_run_without_samples_have_all_headers_and_no_rows(tmp_path, capsys):
+    """The table of headers alone can be read by programs that expect its columns; so can the run's file."""
     table, whole = tmp_path / "m.csv", tmp_path / "m.json"
     assert main(["run", *STUCK, "--out", str(table)]) == 1
     rows = list(csv.reader(table.read_text().splitlines()))
@@ -42,12 +43,14 @@ def test_files_of_a_run_without_samples_have_all_headers_and_no_rows(tmp_path, c
 
 @pytest.mark.parametrize("columns", [[], ["--columns", "energy"]])
 def test_json_of_a_run_without_samples_has_its_outcome_and_no_times(columns, capsys):
+    """STUCK ends at the start with a singular matrix."""
     assert main(["run", *STUCK, "--json", *columns]) == 1
     (record,) = json.loads(capsys.readouterr().out)["records"]
     assert (record["outcome"], record["times"]) == ("SINGULAR_MATRIX", [])
 
 
-def test_plot_of_a_run_without_samples_is_empty_and_its_animation_is_refused(tmp_path, capsys):
+def test_plot_of_a_run_without_samples_is_drawn_and_its_animation_is_refused(tmp_path, capsys):
+    """Axes without curves are a plot with status 1, the run's; a picture of a mechanism needs a pose."""
     assert main(["plot", *STUCK, "--out", str(tmp_path / "p.svg")]) == 1
     assert main(["animate", *STUCK, "--out", str(tmp_path / "a.svg")]) == 2
     assert "no sample to draw: the leading matrix is singular" in capsys.readouterr().err
@@ -55,20 +58,15 @@ def test_plot_of_a_run_without_samples_is_empty_and_its_animation_is_refused(tmp
 
 
 def test_every_array_of_a_motion_without_samples_is_empty(stuck, tmp_path):
-    """Its table has the line of headers alone."""
+    """Columns, energies, reactions and joint coordinates have no row; the table is a line of headers."""
     stuck.to_csv(tmp_path / "m.csv")
     assert (tmp_path / "m.csv").read_text().count("\n") == 1
     columns = stuck.columns()
     assert columns and all(values.shape == (0,) for values in columns.values())
     assert stuck.violation.position.shape == stuck.energy.shape == stuck.largest_reaction.shape == (0,)
-    assert [found.shape for found in stuck.determined_reactions.values()] == [(0, 6)] * len(
-        stuck.mechanism.joint
-    )
-    assert (
-        stuck.reaction_maxima() == {}
-        and stuck.joint("A").angle.shape == (0,)
-        and len(stuck.to_dataframe()) == 0
-    )
+    assert {found.shape for found in stuck.determined_reactions.values()} == {(0, 6)}
+    assert stuck.reaction_maxima() == {} and stuck.joint("A").angle.shape == (0,)
+    assert len(stuck.to_dataframe()) == 0
 
 
 def test_motion_of_another_engine_without_samples_has_empty_columns_of_all_parts():

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import mbref
 from crosscheck.recorded.reading import read
@@ -13,18 +14,9 @@ from tests.helpers.parts import Z, joint
 MASS, RADIUS, RATE, G = 2.0, 0.25, 2 * math.pi, 9.81
 TIMES = np.linspace(0.0, 1.0, 9)
 SIZES = {  # unit of an output → its size in SI, by "mm,deg,kN,ms"
-    "ms": 1e-3,
-    "mm": 1e-3,
-    "mm/s": 1e-3,
-    "mm/s²": 1e-3,
-    "deg": math.pi / 180,
-    "deg/s": math.pi / 180,
-    "deg/s²": math.pi / 180,
-    "kN": 1e3,
-    "kN mm": 1.0,
-    "W": 1.0,
-    "J": 1.0,
-}
+    "ms": 1e-3, "mm": 1e-3, "mm/s": 1e-3, "mm/s²": 1e-3, "deg": math.pi / 180, "deg/s": math.pi / 180,
+    "deg/s²": math.pi / 180, "kN": 1e3, "kN mm": 1.0, "W": 1.0, "J": 1.0,
+}  # fmt: skip
 
 
 def crank(rate=RATE):
@@ -44,8 +36,9 @@ def motion():
 
 
 def test_columns_in_other_units_times_the_size_of_the_unit_are_the_si_columns(motion):
-    """Torques follow from the units of force and length; powers and energies keep their own. Conversion costs
-    a few roundings."""
+    """SIZES has the SI size of each unit: torques follow from the units of force and length, powers and
+    energies keep their own. Conversion costs a few roundings. One turn a second is 60 rpm, and a unit such
+    as N mm can be given for one quantity."""
     plain, converted = motion.columns(), motion.columns(units="mm,deg,kN,ms")
     assert len(plain) == len(converted)
     for (name, values), (header, others) in zip(plain.items(), converted.items(), strict=True):
@@ -62,6 +55,7 @@ def test_columns_in_other_units_times_the_size_of_the_unit_are_the_si_columns(mo
     [("mn", "'mn' is no unit"), ("mm,cm", "'mm' and 'cm' are units of one"), ("kg", "no number of a motion")],
 )
 def test_units_that_no_output_can_have_are_refused(motion, units, message, capsys):
+    """An unknown unit, two units of one quantity, and a unit of mass: by the method and by the command."""
     with pytest.raises(mbref.InputError, match=f"units: .*{message}"):
         motion.columns(units=units)
     with pytest.raises(SystemExit, match="2"):
@@ -108,6 +102,7 @@ def test_command_prints_largest_reactions_and_their_times_in_the_requested_units
 
 
 def test_plot_over_the_angle_of_a_driver_has_the_columns_as_curves(motion):
+    """At the time t the angle is 360 t degrees, and y = 250 sin 2π t mm is the second curve of the panel."""
     figure = motion.plot("mass.position", "A.angle", over="A.angle", units="mm,deg")
     panel, lowest = figure.axes
     assert lowest.get_xlabel() == "A.angle, deg" and panel.get_ylabel() == "position, mm"
@@ -115,20 +110,20 @@ def test_plot_over_the_angle_of_a_driver_has_the_columns_as_curves(motion):
     assert np.allclose(panel.lines[1].get_ydata(), 250 * np.sin(RATE * TIMES), atol=1e-9)  # mm
 
 
-def test_columns_of_one_unit_share_a_panel_on_request(motion):
-    assert [a.get_ylabel() for a in motion.plot("A.moment.z", "driver(A)", "A.rate").axes][:2] == [
-        "moment, N m",
-        "torque, N m",
-    ]
-    panels = motion.plot("A.moment.z", "driver(A).torque", "A.rate", together=True).axes
-    assert [a.get_ylabel() for a in panels] == ["N m", "rate, rad/s"]
-    assert len(panels[0].lines) == 2
+@pytest.mark.parametrize(
+    ("together", "labels"),
+    [(False, ["moment, N m", "torque, N m", "rate, rad/s"]), (True, ["N m", "rate, rad/s"])],
+)
+def test_columns_of_one_unit_share_a_panel_on_request(motion, together, labels):
+    """A moment and a torque have the unit N m, a rate has another one; the request is ``together``."""
+    panels = motion.plot("A.moment.z", "driver(A).torque", "A.rate", together=together).axes
+    assert [panel.get_ylabel() for panel in panels] == labels
+    assert sum(len(panel.lines) for panel in panels) == 3
 
 
 def test_several_motions_are_drawn_into_given_axes(motion):
-    """Curves that are there stay; a label stands behind the name of a column."""
-    from matplotlib.figure import Figure
-
+    """Curves that are there stay, and a label stands behind the name of a column. The motion of 30 rpm turns
+    half as far as the one of 60 rpm."""
     slow = mbref.simulate(crank(rate=math.pi), times=TIMES)
     ax = Figure().subplots()
     ax.plot([0, 1], [0, 1], label="by hand")
@@ -136,13 +131,18 @@ def test_several_motions_are_drawn_into_given_axes(motion):
     names = [text.get_text() for text in ax.get_legend().get_texts()]
     assert names == ["by hand", "A.angle, 60 rpm", "A.angle, 30 rpm"]
     assert np.allclose(ax.lines[2].get_ydata(), ax.lines[1].get_ydata() / 2)
+
+
+def test_two_quantities_for_given_axes_or_three_columns_as_abscissa_are_refused(motion):
+    """Axes have one unit; ``over`` takes one column, and a position has three."""
     with pytest.raises(mbref.InputError, match="ax: takes columns of one quantity"):
-        motion.plot("A.angle", "A.rate", ax=ax)
+        motion.plot("A.angle", "A.rate", ax=Figure().subplots())
     with pytest.raises(mbref.InputError, match="over: must be one column"):
         motion.plot("A.angle", over="mass.position")
 
 
 def test_data_frame_has_the_requested_columns_in_units(motion):
+    """The mass on the crank is at x = 250 cos 2π t mm."""
     frame = motion.to_dataframe("mass.position.x", units="mm")
     assert list(frame.columns) == ["mass.position.x [mm]"] and frame.index.name == "time [s]"
     assert np.allclose(frame["mass.position.x [mm]"], 250 * np.cos(RATE * TIMES), atol=1e-9)  # mm
