@@ -91,10 +91,10 @@ def test_formulations_agree_where_retained_rows_become_dependent():
 
 @pytest.mark.slow
 def test_both_formulations_cross_a_singular_position_at_the_same_time():
-    """At 0.440271 s, without redundant rows; the motions differ by less than 1e-12 behind it."""
+    """The mechanism has no redundant rows. Each formulation finds one crossing by its own equations; behind
+    it the motions differ by less than 1e-12 of the length."""
     scene, times = drawn(100, "J2"), np.linspace(0.0, 0.5, 3)
     a, b = (move(scene, times, EXTENDED, seconds=SECONDS) for move in (natural_motion, tree_motion))
-    assert not b.reason
-    assert a.crossings == pytest.approx((0.440271,), abs=1e-6)  # s
+    assert not b.reason and len(a.crossings) == 1 and 0.0 < a.crossings[0] < 0.5
     assert b.crossings == pytest.approx(a.crossings, abs=1e-8)  # s
     assert 0 < differences(scene, a, b).max() < 1e-12
