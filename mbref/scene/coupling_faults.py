@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, get_args
 
-from mbref.scene.couplings import default_coordinates
+from mbref.scene.couplings import MOST_POWERS, default_coordinates
 from mbref.scene.fields import field_of
 from mbref.scene.function_faults import QUANTITY_OF, Faults, listed
 from mbref.scene.joints import JOINT_TYPES, Coordinate
@@ -58,7 +58,7 @@ def _unit_faults(path: str, coupling: Any, ends: Sequence[tuple[str, str]]) -> F
     ratios = [("ratio", ratio, under[0])] if ratio is not None else []
     every = enumerate(zip(listed(field_of(coupling, "ratios")), under, strict=False))
     ratios += [(f"ratios[{k}]", each, of) for k, (each, of) in every]
-    powers = enumerate(listed(field_of(coupling, "polynomial")))
+    powers = enumerate(listed(field_of(coupling, "polynomial"))[:MOST_POWERS])
     ratios += [(f"polynomial[{k}]", each, f"{under[0]}^{k + 1}" if k else under[0]) for k, each in powers]
     for field, value, of in ratios:
         if dimension_of(value) not in (None, unit(f"{over}/{of}").dimension):

@@ -31,7 +31,7 @@ COUPLED = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.coord
 ACTS_ON = {name: load.acts_on for name, load in LOAD_TYPES.items()}
 NUMBERS = {  # field → content of its list; all other lists contain three numbers
     "orientation": "four numbers (w, x, y, z), for an angle φ about z cos(φ/2), 0, 0, sin(φ/2)",
-    "polynomial": "numbers, such as [0.0, 6.0]",
+    "polynomial": "numbers, such as [0.0, 6.0], of a coupling at most nine",
     "table": "rows of time and value, such as [[0.0, 0.0], [0.5, 1.0], [1.0, 2.0], [1.5, 1.0]]",
     "bodies": "two names of bodies",
     "anchors": "two points of three numbers each",

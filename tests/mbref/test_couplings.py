@@ -7,6 +7,7 @@ from mbref.scene import JOINT_TYPES, SceneError
 from tests.helpers import coupled_mechanisms
 from tests.helpers.coupled_mechanisms import gear_pair, pendulum
 
+AT_MOST_NINE = "numbers, such as [0.0, 6.0], of a coupling at most nine"
 NO_END = "must not end with 0, which has no influence"
 NO_SLIDE = "is revolute, which has no displacement to be coupled"
 
@@ -51,12 +52,16 @@ def test_coupling_takes_the_angle_of_a_joint_that_has_one_and_otherwise_the_disp
             {"ratio": None, "polynomial": [1.0, "2 m"]},
             "coupling[teeth].polynomial[1]: is in rad/rad^2, got '2 m'",
         ),
+        (
+            {"ratio": None, "polynomial": [1] * 10},
+            f"coupling[teeth].polynomial: must be {AT_MOST_NINE}, got [1, 1, 1, 1, 1, 1, ...]",
+        ),
         ({"ratoi": 1.0}, "coupling[teeth].ratoi: is not a known field; did you mean 'ratio'?"),
     ],
 )
 def test_fault_of_a_coupling_is_named_by_its_field(change, fault):
     """A right coupling `teeth` of the hinges A and B gets one change, which is the only fault reported.
-    NO_END and NO_SLIDE are the rest of a sentence."""
+    AT_MOST_NINE, NO_END and NO_SLIDE are the rest of a sentence."""
     entry = {"name": "teeth", "joints": ["A", "B"], "ratio": -0.5} | change
     with pytest.raises(SceneError) as found:
         gear_pair(coupling=[entry])
