@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Setting
-from crosscheck.engines.mujoco import compiled_run, linearised, original
+from crosscheck.engines.mujoco import compiled_run, linearised, original, stops
 from crosscheck.engines.mujoco.families import (
     CHOSEN,
     COMPILED,
@@ -51,7 +51,7 @@ class MuJoCo(linearised.Linearised, Engine):
 
     name = "mujoco"
     package = "mujoco"
-    supports = replace(SUPPORTS, intervals=True)
+    supports = replace(SUPPORTS, intervals=True, stops=True)
     families, options = FAMILIES | original.FAMILIES, OPTIONS | original.OPTIONS
     integrated_here, alternatives = INTEGRATED_HERE, ALTERNATIVES
     defaults_of = tuple(f"mujoco.MjSpec().{part}" for part in DEFAULTS)
@@ -63,16 +63,16 @@ class MuJoCo(linearised.Linearised, Engine):
         return mujoco.__version__
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Refuse scenes without masses whose motion the drivers do not determine completely, and joints with
-        intervals that no equality of MuJoCo can switch."""
-        return lacks_mass(at_start(scene)) or refusal(scene, "MuJoCo")
+        """Refuse scenes without masses whose motion the drivers do not determine completely, joints with
+        intervals that no equality of MuJoCo can switch, and end stops that no limit can be."""
+        return lacks_mass(at_start(scene)) or refusal(scene, "MuJoCo") or stops.refusal(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
         """Return fixed steps chosen by the angle that a body turns in one step, and adaptive steps by
         relative tolerance."""
         first = at_start(scene)
         found = sweep(first, fastest_rate(first, lambda step: self._coarse(scene, step)))
-        return served(scene, found, SERVED)
+        return stops.served(found) if _has_stops(scene) else served(scene, found, SERVED)
 
     def serves(self, scene: Scene, family: str) -> bool:
         """Return whether a family can run a scene; `tuned` and `chosen` run every scene."""
@@ -106,6 +106,10 @@ class MuJoCo(linearised.Linearised, Engine):
             "method": setting.family,
             "settings": dict(setting.options),
         }
+        if _has_stops(scene):
+            stopped = stops.StoppedRun(scene, setting)
+            with stopped.run.installed(), np.errstate(all="ignore"):
+                return stopped.trajectory(times, start, labels)
         if any(intermittent(scene)):
             switched = EqualityRun(scene, setting)
             with switched.run.installed(), np.errstate(all="ignore"):
@@ -120,6 +124,11 @@ class MuJoCo(linearised.Linearised, Engine):
     def _coarse(self, scene: Scene, step: float) -> Trajectory:
         times = np.linspace(0, scene.duration, SCOUT_SAMPLES)
         return self.run(scene, times, Setting("tuned", {"step": step, "beta": 0.5 / step, "hard": HARD}))
+
+
+def _has_stops(scene: Scene) -> bool:
+    """Return whether a joint has an end stop."""
+    return any(joint.end_stop for joint in scene.joint)
 
 
 ENGINE = MuJoCo()

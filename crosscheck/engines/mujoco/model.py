@@ -27,7 +27,7 @@ from crosscheck.engines.shared.spanning_tree import (
     Tree,
     spanning_tree,
 )
-from crosscheck.judge.pieces import holds
+from crosscheck.judge.pieces import at_start, holds
 from crosscheck.refusals import FACTOR, TABLE
 from mbref import rotations
 from mbref.scene import (
@@ -50,6 +50,7 @@ SUPPORTS = replace(
 )
 COUPLING = "coupling "  # prefix of the names of equalities that are couplings
 SWITCHED = "switched "  # prefix of the names of equalities that are joints with intervals, and of their sites
+FAR = 1e10  # rad or m, the end of a range that has no stop
 UNIT = (1.0, 0.0, 0.0, 0.0)
 # placeholder moments, centre and axes during compilation
 GENERAL = ((1.0, 1.1, 1.2), (0.1, 0.2, 0.3), (0.5, 0.5, 0.1, 0.7))
@@ -111,7 +112,7 @@ def compiled(scene: Scene, switched: Sequence[Joint | Coupling] = ()) -> Compile
         applied=applied,
         pushed=pushed,
         timed=timed,
-        rates=initial_rates(scene, tree),
+        rates=initial_rates(at_start(scene), tree),
         links=np.array([model.body(_name(k)).id for k in range(len(tree.links))]),
         single=(mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE),
         drivers=[(model.equality(f"driver {d.joint}").id, d) for d in scene.driver],
@@ -140,6 +141,8 @@ def _built(mujoco: Any, scene: Scene, tree: Tree) -> _Builder:
         built.add_coupling(coupling)
     for i, inertia in tree.armatures(scene):
         built.joint[i].armature = inertia
+    for joint in scene.joint:
+        built.add_stop(joint)
     for driver in scene.driver:
         built.add_driver(driver)
     for k, load in enumerate(scene.load):
@@ -216,6 +219,14 @@ class _Builder:
             kind, self.mujoco.mjtObj.mjOBJ_JOINT, f"driver {driver.joint}", joint.name, ""
         )
         equality.data[:5] = 0.0
+
+    def add_stop(self, joint: Joint) -> None:
+        """Add the end stop of a joint as a limit, with the library's default softness."""
+        if joint.end_stop:
+            limited = self.joint[self.tree.coordinate(self.scene, joint.name)]
+            ends = (joint.end_stop.lower, -FAR), (joint.end_stop.upper, FAR)
+            limited.limited = self.mujoco.mjtLimited.mjLIMITED_TRUE
+            limited.range = [far if end is None else end for end, far in ends]
 
     def add_coupling(self, coupling: Coupling) -> Any:
         """Add the equality of two joints, as MuJoCo's polynomial of degree 4."""

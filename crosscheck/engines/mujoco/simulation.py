@@ -31,6 +31,7 @@ from crosscheck.engines.mujoco.warnings_off import was_reset, without_warnings
 from crosscheck.engines.shared.driver_motion import motion, stated_rate
 from crosscheck.engines.shared.sampling import Adaptive, Counts, Failed, Sample, step_count
 from crosscheck.engines.shared.tree_reactions import LinkMotion, joint_reactions, wrench
+from crosscheck.judge.pieces import at_start
 from crosscheck.judge.time_functions import next_end
 from crosscheck.setting import unknown_family
 from mbref import rotations
@@ -47,7 +48,7 @@ class Simulation:
     def __init__(self, scene: Scene, setting: Setting, switched: Sequence[Joint | Coupling] = ()):
         import mujoco
 
-        self.mujoco, self.scene, self.setting = mujoco, scene, setting
+        self.mujoco, self.scene, self.setting = mujoco, at_start(scene), setting
         self.compiled = compiled(scene, switched)
         self.model = self.compiled.model
         self.counts = Counts()

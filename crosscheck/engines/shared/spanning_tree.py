@@ -171,6 +171,7 @@ def spanning_tree(scene: Scene, closes: Collection[str] = (ROD_END,), between_li
     edges = []
     acting = {driver.joint for driver in scene.driver}
     acting |= {name for coupling in scene.coupling for name in coupling.joints}
+    acting |= {joint.name for joint in scene.joint if joint.end_stop}
     for j, joint in enumerate(scene.joint):
         first, second = joint.bodies
         pair = (scene.body_index(first), scene.body_index(second))
