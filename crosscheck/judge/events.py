@@ -109,6 +109,18 @@ def energy_error(scene: Scene, trajectory: Trajectory) -> float | None:
     return max(float(np.abs(gain).max()) for gain, _ in known) / scale
 
 
+def event_time_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
+    """Return the largest distance (s) of an event of a run from the nearest event of the reference, or
+    of one of these from the nearest event of the run; None without events on one side."""
+    if exact is None or not trajectory.events or not exact.settings.get("events"):
+        return None
+    theirs, end = np.array([event.time for event in trajectory.events]), exact.times.max(initial=0.0)
+    apart = np.abs(theirs[theirs <= end, None] - np.array(exact.settings["events"]))
+    if not apart.size:
+        return None
+    return float(max(apart.min(axis=0).max(), apart.min(axis=1).max()))
+
+
 def impulse_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
     """Return the largest difference of a body's change of momentum at an event from the impulses of its
     joints, relative to the largest momentum; None where a run does not give all impulses."""

@@ -246,6 +246,7 @@ METRICS: dict[str, Metric] = {
     "violation_acceleration": Metric(_violation(2), "rad/s²", "violation of acceleration constraints", True),
     "energy_error": Metric(_energy, "", "drift of the energy balance / largest energy"),
     "reaction_error": Metric(reaction_error, "", "error of unique reactions / largest true reaction", True),
+    "event_time_error": Metric(events.event_time_error, "s", "distance of events from the judge's own"),
     "impact_error": Metric(events.impact_error, "", "error of velocities after impacts / largest velocity"),
     "impulse_error": Metric(events.impulse_error, "", "momentum balance of impacts / momentum"),
     "impact_energy_error": Metric(

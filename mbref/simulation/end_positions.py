@@ -90,10 +90,12 @@ def _joints(run: Run, t: float, q: np.ndarray, rank: int) -> tuple[str, ...]:
 def is_at_dead_position(run: Run) -> bool:
     """Return whether a run that failed is at a dead position of its drivers."""
     state, model = run.memory.state, run.model
-    if not run.scene.driver or model.m > MOST_DRIVEN_ROWS or not np.isfinite(state.coordinates).all():
+    angles = run.memory.equations.angles
+    is_finite = np.isfinite(state.coordinates).all() and np.isfinite(angles).all()
+    if not run.scene.driver or model.m > MOST_DRIVEN_ROWS or not is_finite:
         return False
     now, length = float(run.memory.loop.clock.time), model.length
-    terms = model.terms(now, state.coordinates, angles=run.memory.equations.angles)
+    terms = model.terms(now, state.coordinates, angles=angles)
     jacobian = terms.jacobian * np.tile(np.repeat([length, 1.0], 3), model.nb)
     velocities = np.linalg.lstsq(jacobian, terms.nu, rcond=ROUNDED)[0]
     rate = np.abs(terms.nu).max() * max(1.0, 1.0 / length)

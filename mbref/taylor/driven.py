@@ -23,7 +23,7 @@ from mbref.taylor.crossing.thresholds import CROSSING_START, PIVOT_AHEAD, PIVOT_
 from mbref.taylor.layout import SERIES
 from mbref.taylor.mode import is_accurate, set_high_accuracy, set_predictor
 from mbref.taylor.partition import least_pivot
-from mbref.taylor.samples import put_terms
+from mbref.taylor.samples import put_angles, put_terms
 from mbref.taylor.series_options import ACCURATE_TOLERANCE, PREDICTOR_TOLERANCE
 from mbref.taylor.step_length import SHORTER, longest_step
 from mbref.taylor.stepping import (
@@ -63,11 +63,13 @@ def follow_drivers(memory):
         status = take_accurate_step(memory) if is_accurate(memory) else take_predictor_step(memory)
         if status != OK and status != SINGULAR_AHEAD:
             put_terms(memory.series.past, memory)
+            put_angles(0.0, memory)
             return status
         if clock.time >= progress.end:
             return DONE
         if is_full(memory):
             return PAUSED
+    put_terms(memory.series.terms, memory)  # the pace of steps may end the run here
     return PAUSED
 
 

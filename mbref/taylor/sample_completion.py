@@ -88,20 +88,40 @@ def complete_sample(memory):
 def expand_at_sample(memory):
     """Correct the variables in ``state``, and compute their second derivatives; return OK or the failure
     status."""
-    terms, state, variable = memory.series.terms, memory.state, memory.series.variable
-    lanes, t, status = terms.shape[1], memory.run.loop.clock.time, OK
-    for j in range(0, lanes, WIDTH):
-        store(load(variable, j) * load(state, j), terms, j)
-        store(load(variable, j) * load(state, lanes + j), terms, lanes + j)
-    for _ in range(SAMPLE_CORRECTIONS if memory.options.follows_drivers else 1):
-        status = memory.kernels.expand(t, memory)
-        if status != OK:
-            return status
+    terms, state, lanes = memory.series.terms, memory.state, memory.series.terms.shape[1]
+    status = correct_sample(memory)
+    if status != OK:  # later steps have chosen a partition that is singular here
+        put_sample(memory)
+        memory.kernels.partition(memory)
+        status = correct_sample(memory)
+    if status != OK:
+        return status
     for j in range(0, lanes, WIDTH):
         store(load(terms, j), state, j)
         store(load(terms, lanes + j), state, lanes + j)
         store(2.0 * load(terms, 2 * lanes + j), state, 2 * lanes + j)
     return status
+
+
+@kernel
+def put_sample(memory):
+    """Put the variables in ``state`` and their rates into the first terms of the series."""
+    terms, state, variable = memory.series.terms, memory.state, memory.series.variable
+    for j in range(0, terms.shape[1], WIDTH):
+        store(load(variable, j) * load(state, j), terms, j)
+        store(load(variable, j) * load(state, terms.shape[1] + j), terms, terms.shape[1] + j)
+
+
+@kernel
+def correct_sample(memory):
+    """Correct the variables in ``state`` to rounding in the terms of the series; return OK or the failure
+    status."""
+    put_sample(memory)
+    for _ in range(SAMPLE_CORRECTIONS if memory.options.follows_drivers else 1):
+        status = memory.kernels.expand(memory.run.loop.clock.time, memory)
+        if status != OK:
+            return status
+    return OK
 
 
 @exchangeable(BALANCE)

@@ -134,6 +134,6 @@ def put_angles(h, memory):
     torsions, past = memory.polynomials.torsions, memory.series.past_angles
     for s in range(past.shape[0]):
         value = 0.0
-        for k in range(memory.step.used_order, -1, -1):
+        for k in range(memory.step.used_order if h != 0.0 else 0, -1, -1):
             value = value * h + past[s, k]
         memory.run.equations.angles[torsions.slot[s]] = value

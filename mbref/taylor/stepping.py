@@ -265,4 +265,5 @@ def advance_series(memory):
             return DONE
         if is_full(memory):
             return PAUSED
+    put_terms(memory.series.terms, memory)  # the pace of steps may end the run here
     return PAUSED

@@ -31,6 +31,7 @@ SOURCES = (
     JUDGE / "joint_coordinates.py",
     JUDGE / "impacts.py",
     JUDGE / "pieces.py",
+    JUDGE / "stops.py",
     JUDGE / "time_functions.py",
 )
 DIGEST = hashlib.sha256().digest_size

@@ -36,7 +36,8 @@ class Motion:
     ``crossings`` (s) are times of singular positions that were passed, at most one a step, and ``seconds`` is
     CPU time.
     ``contradiction`` is the largest residual of redundant rows, relative to the largest coordinate, if it was
-    computed. ``formulation`` is A or B.
+    computed. ``formulation`` is A or B. ``events`` (s) are times at which constraints come or go or stops are
+    met.
     """
 
     times: np.ndarray
@@ -53,3 +54,4 @@ class Motion:
     seconds: float
     contradiction: float = 0.0
     formulation: str = "A"
+    events: tuple[float, ...] = ()

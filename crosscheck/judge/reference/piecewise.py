@@ -48,6 +48,7 @@ def motion_by(
     contacts: tuple[str, ...] = ()
     if bounces.ends:
         piece, contacts = _after(scene, piece, 0.0, run(piece, np.zeros(1)), moved, (), bounces)
+    happened = [0.0] if contacts else []
     while True:
         stop = next((t for t in events(scene, float(wanted[-1])) if t > begin), None)
         left = (float(wanted[-1]) if stop is None else stop) - begin
@@ -74,7 +75,8 @@ def motion_by(
             parts[-1] = replace(parts[-1], reason=error.faults[0])
             break
         begin = stop
-    return _joined(parts)
+        happened.append(stop)
+    return replace(_joined(parts), events=tuple(happened))
 
 
 def _after(

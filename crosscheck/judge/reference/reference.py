@@ -47,7 +47,8 @@ class Reference:
     error.
 
     The bound is a distance over the scene's length, or an angle (rad). ``both`` (k,) is True where A and B
-    agree, and False where two runs of one formulation agree. ``seconds`` is the CPU time.
+    agree, and False where two runs of one formulation agree. ``seconds`` is the CPU time. ``events`` (e,) are
+    times (s) at which constraints come or go, or stops are met, up to the last sample.
     """
 
     times: np.ndarray
@@ -60,12 +61,14 @@ class Reference:
     bound: np.ndarray
     both: np.ndarray
     seconds: float
+    events: np.ndarray
 
     def at(self, times: np.ndarray) -> Reference:
         """Return the reference at some of its times (k,)."""
         chosen = np.searchsorted(self.times, times)
         arrays = {name: getattr(self, name)[chosen] for name in ("times", *FIELDS, "bound", "both")}
-        return Reference(**arrays, seconds=self.seconds)
+        events = self.events[self.events <= times.max(initial=0.0)]
+        return Reference(**arrays, seconds=self.seconds, events=events)
 
 
 @dataclass(frozen=True)
@@ -156,6 +159,7 @@ def judged(
         bound=bound[:good],
         both=np.arange(good) < len(other.times),
         seconds=one.seconds + second_run.seconds + other.seconds,
+        events=np.array([t for t in one.events if t <= one.times[:good].max(initial=0.0)]),
     )
     if good < len(apart):
         return (

@@ -53,7 +53,7 @@ def trajectory(scene: Scene, samples: Reference) -> Trajectory:
         engine="truth",
         version="",
         method="reference",
-        settings={"bound": float(samples.bound.max(initial=0.0))},
+        settings={"bound": float(samples.bound.max(initial=0.0)), "events": samples.events.tolist()},
         times=samples.times,
         bodies=tuple(body.name for body in scene.body),
         position=samples.position,

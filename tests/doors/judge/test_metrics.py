@@ -94,7 +94,7 @@ def test_only_metrics_of_the_error_and_of_impacts_are_none_without_a_truth():
     found = measure(SCENE, EXACT)
     missing = {name for name, value in found.items() if value is None}
     errors = {f"{quantity}_error" for quantity in ("position", "rotation", "velocity", "reaction")}
-    impacts = {"impact_error", "impulse_error", "impact_energy_error"}
+    impacts = {"event_time_error", "impact_error", "impulse_error", "impact_energy_error"}
     assert missing == {"error", "error_bound", "error_until", "scd", *errors, *impacts}, missing
 
 

@@ -113,3 +113,19 @@ def test_mjcf_keeps_the_polynomial_and_engines_without_it_refuse(tmp_path):
     assert np.abs(at - [P.deriv()(1.0), P.deriv(2)(1.0) / 2, LAW[2]]).max() <= ROUNDED
     assert engine("mujoco").supports.missing(cam()) is None
     assert "'cam' is a polynomial of degree 3" in str(engine("pinocchio").supports.missing(cam()))
+
+
+@METHODS
+@pytest.mark.parametrize(
+    "law", [(0.3, 0.0, 0.0, -0.4), (1.0, -1.0, 1 / 3), LAW], ids=["end", "tangent", "LAW"]
+)
+def test_driver_of_the_follower_beyond_the_first_end_of_the_polynomial_comes_to_a_dead_position(law, method):
+    """q₂ = 3 t² reaches the value of P where P' = 0: no q₁ follows beyond, or only at infinite speed."""
+    polynomial = np.polynomial.Polynomial([0.0, *law])
+    ends = [root.real for root in polynomial.deriv().roots() if abs(root.imag) < 1e-6 and root.real > 0.0]
+    coupling = [{"name": "cam", "joints": ["A", "B"], "polynomial": list(law)}]
+    driven = cam(coupling=coupling, driver=[{"joint": "B", "polynomial": [0.0, 0.0, 3.0]}], duration=5.0)
+    still = driven.with_(body=[each.model_copy(update={"angular_velocity": None}) for each in driven.body])
+    motion = mbref.simulate(still, method)
+    assert "the drivers come to a dead position" in motion.message
+    assert motion.t_end == pytest.approx(np.sqrt(polynomial(min(ends)) / 3.0), abs=1e-9)
