@@ -54,20 +54,6 @@ def test_evenly_spaced_sample_that_rounding_puts_before_an_event_has_the_state_a
     assert motion.joint("L").active.tolist() == [0, 1, 1, 0]
 
 
-def test_rod_that_its_pivot_releases_flies_along_a_straight_line():
-    """A rod at ω = 5 rad/s, its centre at r = 0.5 m, is released at 0.3 s, at the angle 1.5 rad. Without
-    gravity its centre moves on with ω r across the rod, which turns on, and the pivot has no force."""
-    spin, until, times = 5.0, 0.3, np.array([0.3, 0.5, 1.0])
-    turning = {**rod("rod", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 2.0), "angular_velocity": [0.0, 0.0, spin]}
-    motion = mbref.simulate(pendulum(until, body=[turning], gravity=(0.0, 0.0, 0.0)), times=times)
-    at = 0.5 * np.array([np.cos(spin * until), np.sin(spin * until)])
-    along = 0.5 * np.array([-np.sin(spin * until), np.cos(spin * until)])
-    wanted = at + spin * along * (times - until)[:, None]
-    assert np.allclose(motion.position[:, 0, :2], wanted, rtol=0, atol=ROUNDING)
-    assert np.allclose(motion.angular_velocity[:, 0, 2], spin, rtol=0, atol=ROUNDING)
-    assert not motion.joint("A").force.any() and motion.joint("A").active.tolist() == [0, 0, 0]
-
-
 def test_pendulum_that_a_second_pivot_catches_keeps_its_angular_momentum_about_this_pivot():
     """I ω + m r × v about the pivot, which is 0.6 m from the centre; energy is constant between the
     events."""
