@@ -44,11 +44,11 @@ def test_equation_derived_by_hand_gives_the_true_motion(name: str):
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ["DOP853", "Radau"])
 def test_scipys_integrators_reach_the_true_motion_at_a_fine_tolerance(family: str):
-    """The error from the closed form, of the length or rad, is above 1e-7 at a tolerance of 1e-5, and below
-    it at 1e-9."""
+    """Errors from the closed form are 1e-4 of the length or rad and more at a tolerance of 1e-5. They fall
+    below ten times the larger measured, 9e-9, at 1e-9."""
     from general_integrators import SCIPY
 
     coarse, fine = (
         error_of(SCIPY, "spatial_slider_crank_driven", Setting(family, {"rtol": r})) for r in (1e-5, 1e-9)
     )
-    assert fine < 1e-7 < coarse, (coarse, fine)
+    assert fine < 1e-7 and coarse > 1e-4, (coarse, fine)

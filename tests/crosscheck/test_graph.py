@@ -140,7 +140,8 @@ def test_a_body_is_split_in_halves_to_cut_a_loop_of_equal_joints(kind: str, axis
 
 
 def test_a_rod_takes_less_than_half_of_the_effective_mass_at_its_ends() -> None:
-    """A distance joint becomes a rod with mass, which is taken from its bodies."""
+    """A distance joint becomes a rod, half of whose mass is taken from the body at each end; more than half
+    of the mass that a force feels there stays."""
     scene = every_joint()
     tree = spanning_tree(scene)
     (rod,) = rods(tree)
