@@ -23,23 +23,23 @@ MODEL = """<mujoco><worldbody><body name="a"><joint name="j" axis="0 1 0"/>
 <inertial pos="0 0 -1" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
 COMMANDS = {  # --help of the commands that take long
     "mbref": [
-        "new my.toml", "assemble my.toml --out closed.toml", "schema", "draw my.toml",
-        "animate my.toml --duration 0.1", f"run four_bar_gravity {SHORT} --out motion.csv",
-        f"plot four_bar_gravity energy {SHORT} --out energy.svg", "equilibrium four_bar_gravity",
-        "diagnose my.toml", "modes four_bar_gravity", "fit --help",
+        *("new my.toml", "assemble my.toml --out closed.toml", "schema", "draw my.toml"),
+        *("animate my.toml --duration 0.1", f"run four_bar_gravity {SHORT} --out motion.csv"),
+        *(f"plot four_bar_gravity energy {SHORT} --out energy.svg", "equilibrium four_bar_gravity"),
+        *("diagnose my.toml", "modes four_bar_gravity", "fit --help"),
         f"sensitivities four_bar_gravity {SHORT} --of energy --to gravity.y",
-        "ensemble four_bar_gravity --help", "import model.xml",
-        "export four_bar_gravity --out four_bar.xml", "list", "completion bash",
+        *("ensemble four_bar_gravity --help", "import model.xml"),
+        *("export four_bar_gravity --out four_bar.xml", "list", "completion bash"),
     ],
     "crosscheck": [
-        "list engines", f"run four_bar_gravity --engine mbref --method alf {SHORT}",
-        f"compare four_bar_gravity --engine exudyn {SHORT}", "tune --help", "verify --help", "findings",
-        "files model.xml --engine mbref", "closed-loops", "convergence", "invariants", "alternatives",
-        f"reference four_bar_gravity {SHORT} --out reference.csv", "judge four_bar_gravity motion.csv",
-        "report --render report --section speed", "paper --help", "diff report report", "certify --help",
-        "modes", "diagnose four_bar_gravity --engine mujoco", "versions --help",
+        *("list engines", f"run four_bar_gravity --engine mbref --method alf {SHORT}"),
+        *(f"compare four_bar_gravity --engine exudyn {SHORT}", "tune --help", "verify --help", "findings"),
+        *("files model.xml --engine mbref", "closed-loops", "convergence", "invariants", "alternatives"),
+        *(f"reference four_bar_gravity {SHORT} --out reference.csv", "judge four_bar_gravity motion.csv"),
+        *("report --render report --section speed", "paper --help", "diff report report", "certify --help"),
+        *("modes", "diagnose four_bar_gravity --engine mujoco", "versions --help"),
     ],
-}  # fmt: skip
+}
 RUNNER = """
 import importlib, io, json, sys, contextlib, traceback
 found = []

@@ -11,12 +11,12 @@ from tests.helpers.falling_engine import STONE
 
 PROGRAMS = {"mbref": main, "crosscheck": crosscheck}
 PRINTING = [
-    ("mbref", ["list"]), ("mbref", ["schema"]), ("mbref", ["diagnose", "four_bar", "--start"]),
-    ("mbref", ["completion", "bash"]), ("mbref", ["--version"]), ("mbref", ["run", "--help"]),
+    *(("mbref", ["list"]), ("mbref", ["schema"]), ("mbref", ["diagnose", "four_bar", "--start"])),
+    *(("mbref", ["completion", "bash"]), ("mbref", ["--version"]), ("mbref", ["run", "--help"])),
     ("mbref", ["run", "four_bar", "--duration", "0.01", "--samples", "3", "--estimate", "no"]),
-    ("crosscheck", ["list", "metrics"]), ("crosscheck", ["findings"]), ("crosscheck", ["--version"]),
+    *(("crosscheck", ["list", "metrics"]), ("crosscheck", ["findings"]), ("crosscheck", ["--version"])),
     ("crosscheck", ["closed-loops"]),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(

@@ -12,10 +12,10 @@ from tests.helpers.low_order_engines import FAULTS, Step, euler, low_order, midp
 # without changed scenes, whose runs take most of the time
 SPECIMENS = {each.scene.name: replace(each, related=False) for each in specimens()}
 SHOWN_ON = {  # a scene of the suite on which each fault shows
-    "gravity has the other sign": "pendulum", "gravity acts twice": "pendulum",
-    "a moment acts twice": "moment load", "a spring has half its stiffness": "several springs",
-    "gyroscopic moments are forgotten": "tumbling body", "armature is ignored": "armature pendulum",
-}  # fmt: skip
+    **{"gravity has the other sign": "pendulum", "gravity acts twice": "pendulum"},
+    **{"a moment acts twice": "moment load", "a spring has half its stiffness": "several springs"},
+    **{"gyroscopic moments are forgotten": "tumbling body", "armature is ignored": "armature pendulum"},
+}
 RUNS = sorted(set(SHOWN_ON.values()) - {"armature pendulum"})  # the engine without a fault refuses armatures
 
 

@@ -16,9 +16,9 @@ from mbref.scenes import find_scene
 from tests.helpers.tables import Table, damped_pendulum, double_pendulum, spinning_rod, switched_motor
 
 SCENES: dict[str, Callable[[], Scene]] = {
-    "damped_pendulum": damped_pendulum, "switched_motor": switched_motor, "spinning_rod": spinning_rod,
-    "double_pendulum": double_pendulum, "four_bar_gravity": lambda: find_scene("four_bar_gravity"),
-}  # fmt: skip
+    **{"damped_pendulum": damped_pendulum, "switched_motor": switched_motor, "spinning_rod": spinning_rod},
+    **{"double_pendulum": double_pendulum, "four_bar_gravity": lambda: find_scene("four_bar_gravity")},
+}
 NOTHING = "no change that the judge knows"
 FITTED = 1e-4  # largest fraction of the difference that remains once the named change is undone
 

@@ -20,8 +20,8 @@ FORMULATIONS = {"A": natural_motion, "B": tree_motion}
 ROUNDING = 1e-13  # of the references, in m, m/s and rad/s of mechanisms of about 1 m
 TIMES = np.linspace(0.0, 0.3, 7)
 BALANCES = (
-    "impact_error", "impulse_error", "impact_energy_error", "violation_position", "violation_velocity",
-)  # fmt: skip
+    *("impact_error", "impulse_error", "impact_energy_error", "violation_position", "violation_velocity"),
+)
 SETTINGS = {
     "mujoco": Setting("tuned", {"step": 1e-3, "beta": 50.0, "hard": 1e-7}),
     "pinocchio": Setting("tuned", {"rtol": 1e-10, "min_step": 1e-5}),

@@ -16,11 +16,11 @@ from tests.helpers.short_motions import MOTIONS
 
 LIMIT = 60.0  # CPU s of a reference; each takes about 0.2
 SCENES = (
-    "arm with universal", "arm with planar", "loop with cylindrical", "pendulum with spring with damping",
-    "pendulum with torsion spring", "pendulum with slide spring", "pendulum with force over time",
-    "pendulum with torque by a table", "pendulum with force of a joint that begins", "driven slide",
-    "driven angle by a sine", "driven angle by a table", "four hinges", "small masses on distances",
-)  # fmt: skip
+    *("arm with universal", "arm with planar", "loop with cylindrical", "pendulum with spring with damping"),
+    *("pendulum with torsion spring", "pendulum with slide spring", "pendulum with force over time"),
+    *("pendulum with torque by a table", "pendulum with force of a joint that begins", "driven slide"),
+    *("driven angle by a sine", "driven angle by a table", "four hinges", "small masses on distances"),
+)
 TURNING, OVER_TIME = "pendulum with torsion spring", "pendulum with force over time"
 SLIDING, BY_TABLE = "pendulum with slide spring", "pendulum with torque by a table"
 QUICK = {  # a scene or two for each relation that moves points, loads or functions of time

@@ -10,9 +10,9 @@ from tests.helpers.powered_mechanisms import powered_mechanism
 from tests.helpers.short_motions import MOTIONS
 
 GATE = (
-    "pendulum with torsion spring", "driven angle by a table", "planet with armatures", "driven gears",
-    "pendulum with force over time", "arm with distance", "screw with armature",
-)  # fmt: skip
+    *("pendulum with torsion spring", "driven angle by a table", "planet with armatures", "driven gears"),
+    *("pendulum with force over time", "arm with distance", "screw with armature"),
+)
 MAKERS = {**MOTIONS, **{f"powered {seed}": lambda seed=seed: powered_mechanism(seed) for seed in range(12)}}
 CLOSE = 1e-8  # m, rad/s; two runs at rtol 1e-12, of which one starts with rounded poses
 
