@@ -29,7 +29,7 @@ from mbref.scene import Scene, intermittent
 from mbref.scene.joints import ANGLE
 
 SERVED = "tuned"  # family whose regulariser is negligible, so that limits have their restitution
-FINER = 0.1  # factor on its steps, as a contact lasts up to 60 of them
+FINER = 0.1  # factor on its steps, as a contact lasts up to 32 of them, π / PER_STEP
 PER_STEP = 0.1  # ω times the time step, in which RK4 has errors of the restitution near 1e-3
 MOST_DAMPING = 5.0  # ζ, at which 2 ζ ω times the time step is 1
 CRITICAL = 1e-6  # 1 - ζ, below which critical damping has its own formula
