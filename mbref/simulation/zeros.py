@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from mbref.motions.motion import Motion
 
@@ -117,20 +117,30 @@ def _first(run: Callable[[np.ndarray], Motion], motion: Motion, signal: Signal) 
     value, times = signal.value(motion), motion.times
     floor = signal.floor(value)
     for k in range(len(times) - 1):
-        if value[k + 1] < -floor or (signal.rate and _dips(times, value, signal.rate(motion), k)):
+        ends = (
+            k + 1
+            if value[k + 1] < -floor
+            else _end_of_dip(times, value, signal.rate and signal.rate(motion), k)
+        )
+        if ends:
             if abs(value[k]) <= floor and value[k + 1] < -floor:
                 return float(times[k]) or FROM_ZERO
-            found = _between(run, signal, floor, float(times[k]), float(times[k + 1]))
+            found = _between(run, signal, floor, float(times[k]), float(times[ends]))
             if found is not None:
                 return found
     return None
 
 
-def _dips(times: np.ndarray, value: np.ndarray, rate: np.ndarray, k: int) -> bool:
-    """Return whether a signal, whose rate changes its sign from minus to plus, may be negative between."""
-    if not rate[k] < 0.0 < rate[k + 1]:
-        return False
-    return bool(min(value[k], value[k + 1]) < max(-rate[k], rate[k + 1]) * (times[k + 1] - times[k]))
+def _end_of_dip(times: np.ndarray, value: np.ndarray, rate: np.ndarray | None, k: int) -> int:
+    """Return the index of the sample up to which a signal may be negative after sample k, though no sample
+    is: its rate changes its sign from minus to plus, or a sample is its minimum. Return 0 without one."""
+    if rate is not None:
+        steepest = max(-rate[k], rate[k + 1]) * (times[k + 1] - times[k])
+        return (k + 1) * bool(rate[k] < 0.0 < rate[k + 1] and min(value[k : k + 2]) < steepest)
+    if k + 2 >= len(times) or min(np.diff(times[k : k + 3])) <= 2 * JUMP * times[-1]:
+        return 0
+    first, lowest, last = value[k : k + 3]
+    return (k + 2) * bool(lowest <= min(first, last) and lowest < max(first, last) - lowest)
 
 
 def _between(
@@ -143,14 +153,20 @@ def _between(
     nodes = begin + (end - begin) * (places + 1) / 2
     nodes[-1] = end
     value = signal.value(run(nodes))
-    below = np.flatnonzero(value < -floor)
-    if not below.size or below[0] == 0:
+    law = np.polynomial.Chebyshev.fit(nodes, value, NODES - 1, domain=[begin, end])
+    k = int(np.argmax(value < -floor)) or int(np.argmin(value))
+    if value[0] < -floor or (k in (0, NODES - 1) and not value[k] < -floor):
         return None
-    k = int(below[0])
+    below = float(nodes[k])
+    if not value[k] < -floor:
+        below = _lowest(law, nodes[k - 1 : k + 2])
+        if not signal.value(run(np.array([below])))[0] < -floor:
+            return None
+        k += bool(below > nodes[k])
     if abs(value[k - 1]) <= floor:
         return float(nodes[k - 1]) or FROM_ZERO
-    law = np.polynomial.Chebyshev.fit(nodes, value, NODES - 1, domain=[begin, end])
-    time = float(brentq(law, nodes[k - 1], nodes[k], xtol=1e-15 * end)) if law(nodes[k - 1]) > 0 else nodes[k]
+    before = float(nodes[k - 1])
+    time = float(brentq(law, before, below, xtol=1e-15 * end)) if law(before) > 0 > law(below) else below
     slope = float(law.deriv()(time))
     for _ in range(MOST_ROOT_STEPS):
         at = run(np.array([time]))
@@ -160,3 +176,12 @@ def _between(
         if abs(step) <= 4 * np.finfo(float).eps * end:
             break
     return time
+
+
+def _lowest(law: np.polynomial.Chebyshev, nodes: np.ndarray) -> float:
+    """Return the time at which a polynomial is least between the outer two of three nodes (3,), s."""
+    first, _, last = map(float, nodes)
+    found = minimize_scalar(
+        law, bounds=(first, last), method="bounded", options={"xatol": 1e-9 * (last - first)}
+    )
+    return float(found.x)

@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 
 import numpy as np
+from scipy.optimize import brentq
 
 from crosscheck.judge.arithmetic import doubles
 from crosscheck.judge.pieces import State, parts_of
@@ -18,6 +19,7 @@ from crosscheck.judge.reference.signals import (
     Moved,
     Seen,
     Signal,
+    lowest_samples,
     of_conditions,
     of_stop,
     refuse_open,
@@ -38,13 +40,14 @@ from crosscheck.judge.stops import (
 from mbref.scene import Scene
 
 Run = Callable[[Scene, np.ndarray], Motion]  # of a piece, at increasing times (k,), s
-SAMPLES = 129  # least number of a piece, between which a gap closes at most once
+SAMPLES = 129  # least number of a piece, between which a signal has at most one minimum
 PER_STEP, PER_PERIOD = 8, 32  # samples for each step of the reference, and period of a function of time
 BETWEEN = 9  # samples from one change of a function's law to the next
 BEFORE = 1e-12  # time before such a change / its time, at which forces have their values before it
-STEPS = 12  # of a search for a time, each of which doubles its digits or halves its interval
 SOONEST = 1e-10  # of the longest time, below which an event is at the beginning
 AFTER = 1e-6  # time / end time, at which the force of a contact has its sign
+DIP_NODES = 13  # samples of an interval in which a signal may be negative; the polynomial's error is rounding
+REAL = 1e-6  # imaginary part of a turning point / half the interval, below which it is real
 SAME = 1e-12  # difference of times / longest time, by rounding, of events at once
 
 
@@ -75,6 +78,9 @@ class Bounces:
             signals += of_conditions(self._scene, piece, begin, moved, seen)
         while signals and len(seen.times):
             values = np.stack([signal.value(seen) for signal in signals], axis=1)
+            if dips := [*self._dips(whole, signals, seen.times, values)]:
+                seen = Seen(whole, self._run(whole, np.unique([*seen.times, *dips])))
+                values = np.stack([signal.value(seen) for signal in signals], axis=1)
             floors = [signal.floor(values[:, k]) for k, signal in enumerate(signals)]
             below = values < -np.array(floors)
             released = below[0] & [signal.is_force for signal in signals]
@@ -85,7 +91,7 @@ class Bounces:
             if rows.size and rows[0] > 1:
                 around = slice(int(rows[0]) - 1, int(rows[0]) + 1)
                 met = {
-                    signals[k].name: self._between(whole, signals[k], seen.times[around], values[around, k])
+                    signals[k].name: self._between(whole, signals[k], seen.times[around])
                     for k in np.flatnonzero(below[rows[0]])
                 }
                 time = min(met.values())
@@ -124,26 +130,33 @@ class Bounces:
         even = np.linspace(0.0, window, PER_STEP * found.steps)
         return self._run(piece, np.unique([*np.concatenate(parts), *even]))
 
-    def _between(
-        self,
-        whole: Scene,
-        signal: Signal,
-        times: np.ndarray,
-        values: np.ndarray,
-    ) -> float:
-        """Return the time (s) in an interval at which a signal is zero, by inverse interpolation."""
-        (low, high), (first, last) = map(float, times), map(float, values)
-        points = [(low, first), (high, last)]
-        for _ in range(STEPS):
-            at = float(_inverse(points))
-            at = at if low < at < high else (low + high) / 2
-            found = self._run(whole, np.linspace(0.0, at, 9))
-            value = float(signal.value(Seen(whole, found))[-1])
-            points = [*points[-3:], (at, value)]
-            low, high = (at, high) if value > 0 else (low, at)
-            if abs(points[-1][0] - points[-2][0]) <= 4 * np.finfo(float).eps * high or value == 0.0:
-                return at
-        return at
+    def _dips(
+        self, whole: Scene, signals: Sequence[Signal], times: np.ndarray, values: np.ndarray
+    ) -> Iterator[float]:
+        """Yield times (s) between samples (k,) at which signals (k, s) have minima that may be negative.
+
+        They are turning points of the polynomial through samples of two intervals.
+        """
+        for signal, value in zip(signals, values.T, strict=True):
+            for k in lowest_samples(times, value):
+                middle, half = (times[k + 1] + times[k - 1]) / 2, (times[k + 1] - times[k - 1]) / 2
+                nodes = middle - half * np.cos(np.pi * np.arange(DIP_NODES) / (DIP_NODES - 1))
+                found = Seen(whole, self._run(whole, np.unique([0.0, *nodes])))
+                law = np.polynomial.Chebyshev.fit(nodes, signal.value(found)[-DIP_NODES:], DIP_NODES - 1)
+                turns = law.deriv().roots()
+                turns = turns.real[np.abs(turns.imag) < half * REAL]
+                yield from turns[np.abs(turns - middle) < half]
+
+    def _between(self, whole: Scene, signal: Signal, times: np.ndarray) -> float:
+        """Return the time (s) between two samples (2,) at which a signal is zero."""
+
+        def value(at: float) -> float:
+            return float(signal.value(Seen(whole, self._run(whole, np.linspace(0.0, at, 9))))[-1])
+
+        low, high = map(float, times)
+        if value(low) <= 0.0:
+            return low
+        return float(brentq(value, low, high, xtol=4 * np.finfo(float).eps * high))
 
     def meet(
         self, piece: Scene, after: Scene, before: State, contacts: Collection[str], moved: Moved
@@ -190,20 +203,6 @@ def _resting(piece: Scene, touching: Sequence[End], state: State, before: State)
     """Return the ends whose gaps neither open nor close in a state after an impact."""
     slow = np.abs(rates_of(piece, touching, state)) <= still(piece, before)
     return [end for end, rests in zip(touching, slow, strict=True) if rests]
-
-
-def _inverse(points: Sequence[tuple[float, float]]) -> float:
-    """Return the time at value zero by the polynomial t(value) through points (t, value)."""
-    total = 0.0
-    for i, (time, value) in enumerate(points):
-        weight = 1.0
-        for j, (_, other) in enumerate(points):
-            if i != j:
-                if other == value:
-                    return np.nan
-                weight *= -other / (value - other)
-        total += weight * time
-    return total
 
 
 def _moving(piece: Scene, state: State) -> Scene:

@@ -24,6 +24,7 @@ from mbref.scene.joints import ANGLE
 
 PULL = 1e-9  # force / largest force, which rounding may leave
 FLOOR = 1e-2  # gap that rounding may leave / gap of a coordinate at its end
+JUMP = 1e-10  # interval of samples / longest time, below which it is at a change of a function's law
 OPEN = 1e-6  # share of a reaction along wrenches that redundant constraints leave open
 FIELDS = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
 Moved = Mapping[str, np.ndarray]  # angle (rad) and displacement (m) (2,) since t = 0, by joint
@@ -67,6 +68,14 @@ class Signal(NamedTuple):
     def floor(self, values: np.ndarray) -> float:
         """Return the size that rounding may give to values (k,) that are zero."""
         return max(self.least, self.is_force * PULL * float(np.abs(values).max(initial=0.0)))
+
+
+def lowest_samples(times: np.ndarray, value: np.ndarray) -> np.ndarray:
+    """Return the indices of samples (k,) at which a positive signal has minima that may be negative between
+    samples; there are none beside a change of a function's law."""
+    low, high = np.minimum(value[:-2], value[2:]), np.maximum(value[:-2], value[2:])
+    even = np.minimum(np.diff(times)[:-1], np.diff(times)[1:]) > JUMP * times[-1]
+    return 1 + np.flatnonzero(even & (value[1:-1] >= 0.0) & (value[1:-1] <= low) & (value[1:-1] < high / 2))
 
 
 def of_stop(piece: Scene, end: End, contacts: Collection[str], moved: Moved) -> Signal:

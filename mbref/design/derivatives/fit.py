@@ -163,6 +163,8 @@ def _columns(measured: Mapping[str, np.ndarray] | str | Path) -> dict[str, np.nd
                 raise InputError(f"{measured}: has the column {name!r} twice; remove one")
         measured = dict(zip(names, table.T, strict=True))
     found = {name: np.asarray(values, dtype=float) for name, values in measured.items()}
+    if named := next((name for name in found if name.endswith("]")), None):
+        raise InputError(f"measured: column {named!r} has a unit; give SI units, and names without units")
     if "time" not in found or len(found) < 2 or len({values.shape for values in found.values()}) > 1:
         raise InputError("measured: needs time and one column at least, of equal lengths")
     return found

@@ -181,10 +181,32 @@ def test_two_masses_on_a_line_keep_their_momentum_and_part_by_the_restitution(na
     assert abs(after[1] - after[0] - restitution * (SPEEDS[0] - SPEEDS[1])) <= close
 
 
+def vibration(share: float) -> Scene:
+    """A mass of 1 kg on a spring at sin(4 t) / 4 m, with a stop at (1 - share) / 4 m."""
+    stop = {"upper": (1 - share) / 4, "restitution": 0.5}
+    return Scene(
+        name="vibration",
+        body=[body("a", 1.0, [0.1] * 3, ORIGIN, velocity=list(X))],
+        joint=[slide("S", "ground", "a", ORIGIN, X, stop=stop)],
+        load=[{"type": "slide_spring", "joint": "S", "stiffness": 16.0}],
+    )
+
+
+@pytest.mark.parametrize("share", [1e-2, 1e-4, 1e-8])
+def test_stop_just_below_the_reach_of_a_vibration_is_met(share):
+    """At asin(1 - share) / 4 s, with the rate cos 4 t, of which half is left. Rounding of places costs
+    ROUNDED / rate of a time, and 16 times as much of the rate."""
+    time, rate = np.arcsin(1 - share) / 4, np.sqrt(share * (2 - share))
+    (event,) = mbref.simulate(vibration(share), "taylor", times=[0.0, 0.5], rtol=1e-13).events
+    assert event.stops == ("S.upper",) and abs(event.time - time) <= ROUNDED / rate
+    assert abs(event.velocity_after[0, 0] + rate / 2) <= 16 * ROUNDED / rate
+
+
 @pytest.mark.parametrize(
     ("scene", "formulation"),
     [
         pytest.param(pushed(), natural_motion, id="contact that ends, natural coordinates"),
+        pytest.param(vibration(1e-4), natural_motion, id="stop below a reach, natural coordinates"),
         pytest.param(door(), tree_motion, id="rod that rebounds, tree of joints", marks=pytest.mark.slow),
     ],
 )
