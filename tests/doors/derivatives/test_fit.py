@@ -49,3 +49,10 @@ def test_constant_column_counts_no_more_than_others():
     columns = mbref.simulate(pendulum(), times=times).columns("A.angle")
     found = mbref.fit(wrong, {**columns, "bob.position.z": np.full(3, 0.1)}, ["body[bob].mass"])
     assert found.numbers["body[bob].mass"] == pytest.approx(1.3, rel=1e-6)
+
+
+def test_table_with_units_in_its_names_is_refused_with_a_column(tmp_path):
+    """``mbref run --units deg`` writes them; numbers in degrees would be fitted as radians."""
+    mbref.simulate(pendulum(), times=[0.2, 0.4]).to_csv(tmp_path / "run.csv", units="deg")
+    with pytest.raises(mbref.InputError, match=r"column 'time \[s\]' has a unit; give SI units"):
+        mbref.fit(pendulum(), tmp_path / "run.csv", ["gravity.y"])
