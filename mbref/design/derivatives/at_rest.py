@@ -20,7 +20,7 @@ from mbref.design.derivatives.sensitivities import (
 from mbref.design.derivatives.start_numbers import is_of_start
 from mbref.design.derivatives.states import Direction, States
 from mbref.design.derivatives.tangents import (
-    Partition,
+    RowPartition,
     TangentRows,
     partition_of,
     tangents_at,
@@ -97,7 +97,7 @@ class MovedEquilibrium(NamedTuple):
     in m and rad, and of the multipliers (m, numbers), by numbers of the scene."""
 
     state: States
-    partition: Partition
+    partition: RowPartition
     x: np.ndarray
     multipliers: np.ndarray
 

@@ -63,9 +63,9 @@ class EigenvalueSensitivities:
 def eigenvalue_sensitivities(scene: Scene | str | Path, to: Sequence[str]) -> EigenvalueSensitivities:
     """Return derivatives of the eigenvalues of small motions about an equilibrium.
 
-    With u the independent displacements, small motions obey u'' = K u + C u', so that the eigenvalues s are
-    those of A = [0, 1; K, C], and s' = wᴴ A' v / wᴴ v with right and left vectors v and w. A' contains the
-    motion of the equilibrium with the number.
+    With u the independent displacements, small motions obey u'' = K u + C u', so that s are the eigenvalues
+    of A = [0, 1; K, C], and s' = wᴴ A' v / wᴴ v with right and left vectors v and w. A' contains the motion
+    of the equilibrium with the number.
 
     Parameters
     ----------

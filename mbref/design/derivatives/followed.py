@@ -10,10 +10,10 @@ from mbref.design.derivatives.panels import Gauss, tails
 from mbref.design.derivatives.states import States
 from mbref.design.derivatives.tangents import (
     MOST_ENTRIES,
-    Partition,
+    RowPartition,
     TangentRows,
     partition_of,
-    ranks_at,
+    tangent_ranks,
 )
 from mbref.equations.model import Model
 from mbref.input_error import InputError
@@ -49,7 +49,7 @@ class Followed:
     edges: np.ndarray
     points: States
     ends: States
-    partitions: list[Partition]
+    partitions: list[RowPartition]
     by_panel: np.ndarray
     by_sample: np.ndarray
 
@@ -65,7 +65,7 @@ class Followed:
     ) -> Followed:
         """Return the run of a scene by a method with its states at samples (k,), s, and in panels.
 
-        The first panels are those of a run ``before``. Raises InputError if the scene has no state at t = 0,
+        A run ``before`` gives its panels. Raises InputError if the scene has no state at t = 0,
         or if panels stay too coarse.
         """
         edges = before.edges if before else np.zeros(1)
@@ -73,7 +73,7 @@ class Followed:
         if not states.times.size:
             raise InputError(f"{scene.name}: {motion.message}")
         undecided = min((crossing.time for crossing in motion.crossings or ()), default=np.inf)
-        ranks = ranks_at(model, states.at([0, -1]))
+        ranks = tangent_ranks(model, states.at([0, -1]))
         if ranks[0] != ranks[1]:
             undecided = 0.0  # the motion starts at a singular position
         reached = samples[(samples < undecided) & (samples <= states.times[-1])]
@@ -156,12 +156,12 @@ def _are_unresolved(model: Model, points: States, rule: Gauss) -> np.ndarray:
 
 def _partitions(
     model: Model, states: States, freedoms: int, rule: Gauss | None = None
-) -> tuple[list[Partition], np.ndarray, np.ndarray]:
+) -> tuple[list[RowPartition], np.ndarray, np.ndarray]:
     """Return partitions, the index (panels,) of the one that each panel uses, and which panels are too long
     for one. ``states`` (panels N,) are at the points of the rule, or without a rule one of each panel."""
     points = len(rule.points) if rule else 1
     count = len(states.times) // points
-    found: list[Partition] = []
+    found: list[RowPartition] = []
     used, rough = np.full(count, -1), np.zeros(count, dtype=bool)
     size = max(1, MOST_ENTRIES // max(1, points * model.n * (model.m + model.n)))
     while (left := np.flatnonzero((used < 0) & ~rough)).size:

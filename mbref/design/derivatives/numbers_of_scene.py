@@ -43,13 +43,13 @@ UNITS_OF_TURNS = {"stiffness": "N m/rad", "damping": "N m s/rad", "armature": "k
 UNITS_OF_SLIDES = {"stiffness": "N/m", "damping": "N s/m", "armature": "kg"}
 REDUCED = tuple(4.0**-k for k in range(6))  # factors on the step, the first ones preferred
 # factors and stencils that are tried in turn; those to one side only where the others leave more than ROUGH
-CENTRAL = ((1.0, affine()), *((factor, central()) for factor in REDUCED))
-ONE_SIDED = tuple((factor, one_sided(sign)) for factor in REDUCED for sign in (1.0, -1.0))
+CENTRAL_STENCILS = ((1.0, affine()), *((factor, central()) for factor in REDUCED))
+ONE_SIDED_STENCILS = tuple((factor, one_sided(sign)) for factor in REDUCED for sign in (1.0, -1.0))
 ACCURATE = 1e-12  # relative error of a derivative of the scene's arrays from which no smaller step is tried
 ROUGH = 1e-6  # relative error above which the arrays are not smooth in the number
 # displacement of a state in general position that undoes alignments, lengths of the shortest spring or rad
 GENERAL = 0.02
-CHANGED = 100.0  # roundings of the largest value in an array, below which a value does not change
+CHANGED_ROUNDINGS = 100.0  # roundings of the largest value in an array, below which a value does not change
 TERMS_ROUNDING = 50.0  # roundings of the largest term that the many operations of a term may leave
 EPSILON = float(np.finfo(float).eps)
 
@@ -87,7 +87,7 @@ def variants_of(scene: Scene, label: str, base: Model, step: float) -> Variants:
     valid; central if possible. ``base`` and ``step`` are as of ``scene_number``."""
     size = step * _size(number_at(scene, label), label, base)
     faults: list[SceneError] = []
-    for factor, stencil in (*CENTRAL[1:], *ONE_SIDED):
+    for factor, stencil in (*CENTRAL_STENCILS[1:], *ONE_SIDED_STENCILS):
         try:
             return Variants.of(scene, label, factor * size, stencil, base)
         except SceneError as fault:
@@ -145,7 +145,7 @@ def scene_number(scene: Scene, label: str, base: Model, step: float) -> SceneNum
     size = step * _size(number_at(scene, label), label, base)
     found: list[SceneNumber] = []
     faults: list[SceneError] = []
-    for stencils in (CENTRAL, ONE_SIDED):
+    for stencils in (CENTRAL_STENCILS, ONE_SIDED_STENCILS):
         for factor, stencil in stencils:
             try:
                 found.append(_differences(scene, label, factor * size, stencil, base))
@@ -235,11 +235,11 @@ def _stencil_error(values: np.ndarray, stencil: Stencil, step: float, allowed: f
     difference from the lower order beyond ``allowed`` roundings, and one rounding without any."""
     table = values.reshape(len(values), -1)
     changes = np.abs(table - table[0]).max(axis=0)
-    table = table[:, changes > CHANGED * EPSILON * np.abs(table).max(initial=0.0)]
+    table = table[:, changes > CHANGED_ROUNDINGS * EPSILON * np.abs(table).max(initial=0.0)]
     found, lower = (weights @ table / step for weights in (stencil.weights, stencil.lower))
     scale = np.abs(found).max(initial=0.0)
     rounded = EPSILON * np.abs(table).max(initial=0.0) / step
-    if scale <= CHANGED * rounded:
+    if scale <= CHANGED_ROUNDINGS * rounded:
         return 0.0
     off = np.abs(found - lower).max()
     return float((max(0.0, off - allowed * rounded) if allowed else off + rounded) / scale)

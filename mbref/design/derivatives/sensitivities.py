@@ -180,8 +180,8 @@ class DerivativeRequest:
     def solved(
         self, method: Method, limits: Limits, precision: Precision, before: Followed | None = None
     ) -> tuple[Derivatives, Followed]:
-        """Return the derivatives of the outputs along a run by a method, and the run; its panels are those of
-        a run ``before``."""
+        """Return the derivatives of the outputs along a run by a method, and the run, which has the panels
+        of a run ``before``."""
         model, step = self.model, precision.step
         run = Followed.of(self.scene, model, method, limits, self.samples, gauss(precision.points), before)
         self.motion = self.motion or run.motion

@@ -25,7 +25,7 @@ NOISE = 1e-12  # rounding of Φ, lengths of the mechanism or rad
 MOST_ENTRIES = 500_000  # numbers at states that are computed together: 4 MB, which caches hold
 
 
-class Partition(NamedTuple):
+class RowPartition(NamedTuple):
     """Independent constraint rows (r,), dependent displacements (r,) that they determine, and independent
     displacements (f,)."""
 
@@ -34,14 +34,14 @@ class Partition(NamedTuple):
     independent: np.ndarray
 
 
-def partition_of(model: Model, state: States) -> Partition:
+def partition_of(model: Model, state: States) -> RowPartition:
     """Return the partition of rows and displacements at one state (1,), by singular values and pivots."""
     rows = unit_rows(terms_along(model, state).jacobian[0] * model.units)
     _, values, right = np.linalg.svd(rows, full_matrices=True)
     rank = int(np.sum(values > TANGENT_RANK * values.max(initial=0.0)))
     independent = _pivots(right[rank:])
     dependent = np.setdiff1d(np.arange(model.n), independent)
-    return Partition(_pivots(rows[:, dependent].T), dependent, independent)
+    return RowPartition(_pivots(rows[:, dependent].T), dependent, independent)
 
 
 def _pivots(matrix: np.ndarray) -> np.ndarray:
@@ -51,7 +51,7 @@ def _pivots(matrix: np.ndarray) -> np.ndarray:
     return np.sort(scipy.linalg.qr(matrix, mode="r", pivoting=True)[1][: len(matrix)])
 
 
-def ranks_at(model: Model, states: States) -> list[int]:
+def tangent_ranks(model: Model, states: States) -> list[int]:
     """Return the ranks of the constraint rows at states."""
     values = np.linalg.svd(unit_rows(terms_along(model, states).jacobian * model.units), compute_uv=False)
     return np.sum(values > TANGENT_RANK * values.max(axis=1, initial=0.0, keepdims=True), axis=1).tolist()
@@ -61,7 +61,7 @@ class TangentRows:
     """The constraint rows at k states, and bases (k, n, f) of the freedoms: each column moves one independent
     displacement by one unit."""
 
-    def __init__(self, model: Model, states: States, partition: Partition):
+    def __init__(self, model: Model, states: States, partition: RowPartition):
         self.model, self.units, self.partition = model, model.units, partition
         self.terms = terms_along(model, states)
         rows = self.terms.jacobian * model.units
