@@ -15,7 +15,7 @@ import numpy as np
 from mbref.scene.fields import COINCIDENT
 
 FEW_POINTS = 32  # points; up to here all pairs of a set cost less than its division
-MET = 1e-9  # distance / radius of gyration; bodies at a smaller distance have met up to errors of a motion
+SAME_POINT = 1e-9  # distance / radius of gyration; bodies at a smaller one have met up to errors of a motion
 ROUNDING = 1e-14  # relative; larger than the rounding of a distance in three dimensions
 
 
@@ -28,7 +28,7 @@ def characteristic_lengths(points: np.ndarray, mass: np.ndarray) -> np.ndarray:
     distances, has_mass = largest_distances(points), mass[..., 0] > 0.0
     squares = np.where(has_mass, mass[..., 3:].max(axis=-1), 0.0) / np.where(has_mass, mass[..., 0], 1.0)
     radii = np.sqrt(squares.max(axis=1))
-    rounding = np.maximum(COINCIDENT * np.abs(points).max(axis=(1, 2)), MET * radii)
+    rounding = np.maximum(COINCIDENT * np.abs(points).max(axis=(1, 2)), SAME_POINT * radii)
     return np.where(distances > rounding, distances, np.where(radii > 0.0, radii, 1.0))
 
 

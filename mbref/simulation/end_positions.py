@@ -23,7 +23,7 @@ from mbref.stepping.run import Run
 TAKES_PART = 0.05  # entry of a left null vector / largest entry: rows with smaller entries are ignored
 NEAR_PIVOT = 0.03  # relative pivot below which failing steps are near a singular position
 TRANSMISSION = 1e2  # largest velocity / driver rate above which the position is dead
-ROUNDED = 1e-13  # relative singular value below which rows are redundant
+REDUNDANT_ROWS = 1e-13  # relative singular value below which rows are redundant
 BEYOND = 1.01  # a run that gets beyond this multiple of the failure's time has met no dead position
 MOST_DRIVEN_ROWS = 400  # constraint rows; larger least-squares problems take seconds
 
@@ -97,7 +97,7 @@ def is_at_dead_position(run: Run) -> bool:
     now, length = float(run.memory.loop.clock.time), model.length
     terms = model.terms(now, state.coordinates, angles=angles)
     jacobian = terms.jacobian * np.tile(np.repeat([length, 1.0], 3), model.nb)
-    velocities = np.linalg.lstsq(jacobian, terms.nu, rcond=ROUNDED)[0]
+    velocities = np.linalg.lstsq(jacobian, terms.nu, rcond=REDUNDANT_ROWS)[0]
     rate = np.abs(terms.nu).max() * max(1.0, 1.0 / length)
     if not np.abs(velocities).max() > TRANSMISSION * rate > 0.0:
         return False
