@@ -168,4 +168,5 @@ def _evidence_of_single(cells: Cells, half: np.ndarray) -> float:
         return -np.inf
     unit = np.where(is_near, 2 * half, 10.0 ** -np.clip(cells.places, -EXACT, EXACT).astype(float))
     distinct = np.unique(cells.values, return_index=True)[1]
-    return float(np.maximum(np.log10(np.spacing(np.abs(singles)) / unit), 0.0)[distinct].sum())
+    shows = np.maximum(np.log10(np.spacing(np.abs(singles)) / unit), 0.0) * (cells.digits > 0)
+    return float(shows[distinct].sum())
