@@ -22,7 +22,7 @@ from mbref.scene import Scene
 from mbref.scene.structure import bushings
 from mbref.simulation import VERSION
 from mbref.simulation.advice import advice_on_rounding, remedy
-from mbref.simulation.end_positions import ROUNDED, Met, is_at_dead_position, is_near, met_by
+from mbref.simulation.end_positions import REDUNDANT_ROWS, Met, is_at_dead_position, is_near, met_by
 from mbref.simulation.runs import trial_of
 from mbref.stepping.leaving import begins_at_rest, fits_no_branch, leaving_acceleration
 from mbref.stepping.loop import (
@@ -229,7 +229,7 @@ def report_of(start: Start, ranks: Ranks, crossings: int) -> str:
 
 
 def _rounded(ranks: Ranks) -> str:
-    return REDUNDANT.format(ranks.next) if ranks.next > ROUNDED else ""
+    return REDUNDANT.format(ranks.next) if ranks.next > REDUNDANT_ROWS else ""
 
 
 def _remedy(run: Run, status: int) -> str:
