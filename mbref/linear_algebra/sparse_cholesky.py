@@ -13,7 +13,7 @@ from numpy import sqrt, uint64
 from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.layout import LINK
 
-NONE, ONE = uint64(0), uint64(1)  # sums with indices stay unsigned: compiled code tests signed indices
+U0, U1 = uint64(0), uint64(1)  # sums with indices stay unsigned: compiled code tests signed indices
 
 
 @inlined
@@ -83,7 +83,7 @@ def divide_column(k, factor, b):
         return False
     inverse, found = 1.0 / l[start], b[k]
     l[start] = inverse
-    for p in range(start + ONE, first[k + ONE]):
+    for p in range(start + U1, first[k + U1]):
         value = l[p]
         scaled[p] = value
         l[p] = value * inverse
@@ -95,8 +95,8 @@ def divide_column(k, factor, b):
 def subtract_from_neighbour(k, factor):
     """Subtract the products of column k of L from the next column, which has the same rows."""
     first, l, scaled = factor.symbolic.l_start, factor.l, factor.scaled
-    start, end = first[k + ONE], first[k + ONE + ONE]
-    apart = start - first[k] - ONE
+    start, end = first[k + U1], first[k + U1 + U1]
+    apart = start - first[k] - U1
     weight = l[start - apart]
     for p in range(start, end):
         l[p] -= weight * scaled[p - apart]
@@ -107,20 +107,20 @@ def subtract_products(k, has_two, place, factor):
     """Subtract the products of the last column k of a panel, and of the column before it if the panel
     ``has_two``, from later columns of L; return the first place in ``symbolic.update`` of the next panel."""
     first, update, l, scaled = factor.symbolic.l_start, factor.symbolic.update, factor.l, factor.scaled
-    start, end = first[k] + ONE, first[k + ONE]
+    start, end = first[k] + U1, first[k + U1]
     if has_two:
-        apart = first[k] - first[k - ONE] - ONE
+        apart = first[k] - first[k - U1] - U1
         for j in range(start, end):
             one, other = scaled[j - apart], scaled[j]
             for i in range(j, end):
                 l[update[place]] -= l[i - apart] * one + l[i] * other
-                place = place + ONE
+                place = place + U1
     else:
         for j in range(start, end):
             one = scaled[j]
             for i in range(j, end):
                 l[update[place]] -= l[i] * one
-                place = place + ONE
+                place = place + U1
     return place
 
 
@@ -133,14 +133,14 @@ def factorise(factor, alpha, b):
     """
     add_products(factor)
     regularise(factor, alpha)
-    panel, place = factor.symbolic.panel, NONE
+    panel, place = factor.symbolic.panel, U0
     for c in range(panel.shape[0] - 1):
-        last = panel[c + 1] - ONE
+        last = panel[c + 1] - U1
         has_two = last > panel[c]
         if has_two:
-            if not divide_column(last - ONE, factor, b):
+            if not divide_column(last - U1, factor, b):
                 return False
-            subtract_from_neighbour(last - ONE, factor)
+            subtract_from_neighbour(last - U1, factor)
         if not divide_column(last, factor, b):
             return False
         place = subtract_products(last, has_two, place, factor)

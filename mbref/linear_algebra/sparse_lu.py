@@ -8,7 +8,7 @@ D.
 from __future__ import annotations
 
 from mbref.kernels.compilation import inlined, kernel
-from mbref.linear_algebra.sparse_cholesky import NONE, ONE
+from mbref.linear_algebra.sparse_cholesky import U0, U1
 
 
 @kernel
@@ -19,16 +19,16 @@ def factorise_product(factor, other, alpha, product):
     ``product.lower`` (nl,) contains L without the ones on its diagonal, ``product.upper`` the entries of Uᵀ.
     The pivots (r,) are relative to the diagonal of D Dᵀ.
     """
-    panel, before = factor.symbolic.panel, NONE
+    panel, before = factor.symbolic.panel, U0
     add_products_of(factor, other, product)
     for c in range(panel.shape[0] - 1):
-        begin, end, place = panel[c] + NONE, panel[c + 1] + NONE, before
+        begin, end, place = panel[c] + U0, panel[c + 1] + U0, before
         for k in range(begin, end):
-            divide_column(k, factor, alpha, product)
-            if k + ONE < end:
-                subtract_from_neighbour(k, factor, product)
+            divide_by_pivot(k, factor, alpha, product)
+            if k + U1 < end:
+                subtract_from_next(k, factor, product)
         for k in range(begin, end):
-            place = subtract_products(k, end, before, factor, product)
+            place = subtract_from_later(k, end, before, factor, product)
         before = place
 
 
@@ -44,25 +44,25 @@ def add_products_of(factor, other, product):
 
 
 @inlined
-def divide_column(k, factor, alpha, product):
+def divide_by_pivot(k, factor, alpha, product):
     """Compute pivot k, and divide column k of L by the pivot."""
     first, start, d, square = factor.symbolic.l_start, factor.symbolic.d_start, factor.d, 0.0
-    for p in range(start[k], start[k + ONE]):
+    for p in range(start[k], start[k + U1]):
         square += d[p] * d[p]
     square = square if square > 0.0 else 1.0  # a row without entries
     pivot = product.lower[first[k]] + square / alpha
     product.pivots[k] = pivot / square
     inverse = 1.0 / pivot if pivot != 0.0 else alpha / square
-    for p in range(first[k] + ONE, first[k + ONE]):
+    for p in range(first[k] + U1, first[k + U1]):
         product.lower[p] *= inverse
 
 
 @inlined
-def subtract_from_neighbour(k, factor, product):
+def subtract_from_next(k, factor, product):
     """Subtract the products of column k of L and row k of U from the next ones, which have equal places."""
     first, lower, upper = factor.symbolic.l_start, product.lower, product.upper
-    start, end = first[k + ONE], first[k + ONE + ONE]
-    apart = start - first[k] - ONE
+    start, end = first[k + U1], first[k + U1 + U1]
+    apart = start - first[k] - U1
     below, right = lower[start - apart], upper[start - apart]
     for p in range(start, end):
         lower[p] -= lower[p - apart] * right
@@ -70,14 +70,14 @@ def subtract_from_neighbour(k, factor, product):
 
 
 @inlined
-def subtract_products(k, end, place, factor, product):
+def subtract_from_later(k, end, place, factor, product):
     """Subtract the products of column k of L and row k of U from the numbers behind the panel, which ends
     before column ``end``; return the first place in ``symbolic.update`` of the next panel."""
     first, update = factor.symbolic.l_start, factor.symbolic.update
     lower, upper = product.lower, product.upper
-    for j in range(first[k] + (end - k), first[k + ONE]):
-        for i in range(j, first[k + ONE]):
+    for j in range(first[k] + (end - k), first[k + U1]):
+        for i in range(j, first[k + U1]):
             lower[update[place]] -= lower[i] * upper[j]
             upper[update[place]] -= lower[j] * upper[i]
-            place = place + ONE
+            place = place + U1
     return place
