@@ -115,13 +115,9 @@ def _is_coarse(motion: Motion, signal: Signal) -> bool:
 def _first(run: Callable[[np.ndarray], Motion], motion: Motion, signal: Signal) -> float | None:
     """Return the first time (s) in a motion at which a signal falls below zero, FROM_ZERO, or None."""
     value, times = signal.value(motion), motion.times
-    floor = signal.floor(value)
+    rate, floor = signal.rate and signal.rate(motion), signal.floor(value)
     for k in range(len(times) - 1):
-        ends = (
-            k + 1
-            if value[k + 1] < -floor
-            else _end_of_dip(times, value, signal.rate and signal.rate(motion), k)
-        )
+        ends = k + 1 if value[k + 1] < -floor else _end_of_dip(times, value, rate, k)
         if ends:
             if abs(value[k]) <= floor and value[k + 1] < -floor:
                 return float(times[k]) or FROM_ZERO
