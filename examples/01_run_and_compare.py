@@ -23,4 +23,5 @@ for name in find_engines(None, notice=print):
     setting = simulator.settings(scene)[-1]
     run = run_isolated(name, scene, times, setting, time_limit=60.0)
     error = measure(scene, run, truth)["error"]
-    print(f"{name:10} {setting.family:28} {run.outcome.label:10} t = {run.t_end:.3g} s, error {error:.1e}")
+    shown = "unknown" if error is None else f"{error:.1e}"  # a run that ends early may have no sample
+    print(f"{name:10} {setting.family:28} {run.outcome.label:10} t = {run.t_end:.3g} s, error {shown}")
