@@ -1,27 +1,27 @@
 """Ctrl-C ends a command with one word and the exit status 130, also while its modules are imported."""
 
-import gc
-import signal
+import subprocess
 import sys
-from importlib import import_module
 
 import pytest
 
+PRESSED = """
+import signal, sys
+
+class Pressed:
+    @staticmethod
+    def find_spec(name, *_):
+        if name == sys.argv[1] + ".commands":
+            signal.raise_signal(signal.SIGINT)
+
+sys.meta_path.insert(0, Pressed)
+__import__(sys.argv[1])
+"""
+
 
 @pytest.mark.parametrize("program", ["mbref.cli", "crosscheck.cli"])
-def test_interrupt_of_an_import_ends_a_command_with_one_word(program, monkeypatch, capsys) -> None:
+def test_interrupt_of_an_import_ends_a_command_with_one_word(program) -> None:
     """A finder of modules sends the signal when the module of the program's commands is asked for."""
-
-    class Pressed:
-        @staticmethod
-        def find_spec(name: str, *_: object) -> None:
-            if name == f"{program}.commands":
-                signal.raise_signal(signal.SIGINT)
-
-    for name in (program, f"{program}.commands"):
-        monkeypatch.delitem(sys.modules, name, raising=False)
-    monkeypatch.setattr(sys, "meta_path", [Pressed, *sys.meta_path])
-    with pytest.raises(SystemExit, match="130"):
-        import_module(program)
-    gc.enable()  # programs turn it off while they import
-    assert capsys.readouterr() == ("", "interrupted\n")
+    words = [sys.executable, "-c", PRESSED, program]
+    ran = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stdout, ran.stderr) == (130, "", "interrupted\n")

@@ -101,9 +101,9 @@ def test_factorisation_of_500_rows_on_one_coordinate_is_refused_before_its_updat
         symbolic_factorisation(row, column, row, np.ones(1, dtype=bool))
 
 
-def test_factorisation_of_300_rows_on_one_coordinate_leaves_no_file_above_32_mb_in_the_cache():
-    """Its list of updates, 2 · 4 bytes for each of n³ / 6, has 36 MB. One of 3 rows leaves a file."""
-    for count in (3, 300):
+def test_factorisation_of_480_rows_on_one_coordinate_leaves_no_file_above_32_mb_in_the_cache():
+    """Its list of updates, 4 bytes for two of n³ / 6 updates, has 37 MB. One of 3 rows leaves a file."""
+    for count in (3, 480):
         row, column = np.arange(count), np.zeros(count, dtype=int)
         made = symbolic_factorisation(row, column, row, np.ones(1, dtype=bool))
     assert 4 * sum(array.size for array in made) > 36e6
