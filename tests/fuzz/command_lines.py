@@ -106,11 +106,15 @@ def commands() -> tuple[Command, ...]:
     return *others, report._replace(program=report_main, words=[])
 
 
+def drawn_command(draw: random.Random) -> Command:
+    """Return a command, drawn by its number of options."""
+    return draw.choices(commands(), [len(command.actions) for command in commands()])[0]
+
+
 def command_line(seed: int) -> str:
     """Run one command line; return its command and how it ended."""
     draw = random.Random(seed)
-    weights = [len(command.actions) for command in commands()]
-    (chosen,) = draw.choices(commands(), weights)
+    chosen = drawn_command(draw)
     place = Path(tempfile.mkdtemp(prefix="case", dir="."))
     outside, before = _entries(Path()), Path.cwd()
     os.chdir(place)

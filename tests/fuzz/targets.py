@@ -108,12 +108,14 @@ def _where(error: BaseException) -> str:
 def _interrupted_after(seconds: float) -> Iterator[None]:
     """SIGINT, as from Ctrl-C, unless the block ends before."""
     before = signal.signal(signal.SIGALRM, _interrupt)
+    ignored = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores SIGINT
     signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
+        signal.signal(signal.SIGINT, ignored)
 
 
 def _interrupt(*_: object) -> None:

@@ -14,6 +14,7 @@ class Pressed:
         if name == sys.argv[1] + ".commands":
             signal.raise_signal(signal.SIGINT)
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's background ignores
 sys.meta_path.insert(0, Pressed)
 __import__(sys.argv[1])
 """
