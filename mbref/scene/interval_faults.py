@@ -106,7 +106,7 @@ def _watched_faults(path: str, when: Any, types: Mapping[str, str]) -> Faults:
     kind = types.get(name) if isinstance(name, str) else None
     if kind not in JOINT_TYPES or not (known := JOINT_TYPES[kind].facts.coordinates):
         return  # reported as a fault of the joint's name
-    chosen = coordinate or JOINT_TYPES[kind].facts.main
+    chosen = JOINT_TYPES[kind].facts.main if coordinate is None else _text(when, "coordinate")
     if chosen in QUANTITY_OF and chosen not in known:
         yield f"{path}.coordinate", f"{name!r} is {kind}, which has no {chosen}"
     elif chosen in QUANTITY_OF and not fits(reaches, QUANTITY_OF[chosen]):

@@ -16,10 +16,11 @@ from mbref.motions.watched import loaded, watched
 from mbref.scene import Scene, SceneError
 from mbref.scene.conditions import Release, When
 from mbref.scene.joints import ANGLE
-from mbref.simulation.end_stops import GAP_CLOSED, GAP_ROUNDED, LOOK, counted
+from mbref.simulation.end_stops import GAP_CLOSED, GAP_ROUNDED, counted
 from mbref.simulation.zeros import PULL, Signal
 
-PROBES = 32  # times of a piece at which a coordinate that starts at its value may have left it
+PROBES = 32  # intervals of a piece, or of a part of it, in one of which a coordinate leaves its value
+PARTS = 4  # such parts, each inside the one before; intervals of the last one are 1e-6 of the piece
 MotionOf = Callable[[Scene, np.ndarray], Motion]  # of a piece, at times (k,), s
 Watched = Callable[[Trajectory], tuple[np.ndarray, np.ndarray]]  # a coordinate and its rate (k,)
 
@@ -30,9 +31,9 @@ class Conditions:
     def __init__(self, scene: Scene, run: MotionOf, end: float, length: float):
         self._scene, self._run, self._end, self._length = scene, run, end, length
 
-    def exceeded(self, piece: Scene, held: Scene) -> tuple[str, ...]:
-        """Return the names of the constraints that reactions release at the begin of a piece; ``held`` is the
-        piece with its contacts.
+    def exceeded(self, piece: Scene, held: Scene, left: float) -> tuple[str, ...]:
+        """Return the names of the constraints that reactions release at the begin of a piece of length
+        ``left`` (s); ``held`` is the piece with its contacts.
 
         Raises SceneError for a reaction that redundant constraints leave open.
         """
@@ -46,8 +47,9 @@ class Conditions:
         q, blocks = model.start(), model.terms(0.0, model.start()).blocks
         changes = list(open_changes(model, q.reshape(1, model.nb, 7), blocks[None]))
         model.release()
+        probed = self._run(held, np.linspace(0.0, left, PROBES + 1)) if changes and left else motion
         for each, release, name in releasing:
-            wrench = (motion.reactions or {})[name]
+            wrench = _first_load(release, (probed.reactions or {})[name])
             if _is_open(release, wrench, [change[name] for change in changes]):
                 kind = "force" if release.force else "moment"
                 why = f"redundant constraints leave the {kind} in joint {name!r} open"
@@ -93,13 +95,19 @@ class Conditions:
     def _side(self, held: Scene, watch: Watched, when: When, left: float) -> float:
         """Return the sign of a coordinate minus its value, from which it can reach the value: where a piece
         begins, or after the coordinate has left the value; 0 if it stays there."""
-        probes = [0.0, LOOK * self._end, *np.linspace(0.0, left, PROBES + 1)[1:]]
-        for times in (np.zeros(1), np.unique(probes)):
+
+        def sides(times: np.ndarray) -> np.ndarray:
             off = watch(self._run(held, times))[0] - when.reaches
-            away = off[np.abs(off) > 10 * self._least(when)]
-            if away.size:
-                return float(np.sign(away[0]))
-        return 0.0
+            return np.sign(off) * (np.abs(off) > 10 * self._least(when))
+
+        side, first, last = float(sides(np.zeros(1)).sum()), 0.0, left
+        for _ in range(PARTS if left and not side else 0):
+            times = np.linspace(first, last, PROBES + 1)
+            away = np.flatnonzero(found := sides(times))
+            if not away.size or not away[0]:
+                break
+            side, first, last = (float(each) for each in (found[away[0]], *times[away[0] - 1 : away[0] + 1]))
+        return side
 
 
 def _parts(
@@ -112,6 +120,13 @@ def _parts(
 def _spare(release: Release, name: str, motion: Motion) -> np.ndarray:
     """Return the limit of a release minus the reaction (k,) of a joint, N or N m."""
     return np.asarray(release.limit - loaded(release, (motion.reactions or {})[name]))
+
+
+def _first_load(release: Release, wrench: np.ndarray) -> np.ndarray:
+    """Return the first reaction (1, 6) of a joint, of (k, 6), whose size that releases is not rounding."""
+    size = np.linalg.norm(wrench[:, :3] if release.force else wrench[:, 3:], axis=1)
+    k = int(np.argmax(size > PULL * release.limit))
+    return wrench[k : k + 1]
 
 
 def _is_open(release: Release, wrench: np.ndarray, changes: Sequence[np.ndarray]) -> bool:

@@ -32,12 +32,13 @@ from mbref.scene.bodies import DRIVER
 from mbref.scene.intervals import at_sample, samples_at
 from mbref.simulation.conditions import Conditions
 from mbref.simulation.end_stops import EndStops, laws, with_impact
-from mbref.simulation.zeros import first_zero
+from mbref.simulation.zeros import SAME_ZERO, first_zero
 from mbref.stepping.limits import Limits
 from mbref.stepping.run import missing_masses
 
 MOST_EVENTS = 1000  # events of a scene with end stops or conditions, at which a run ends
 Reached = Callable[[float], None] | None
+PAST_CHANGE = 1e-10  # time after a change by an interval / end time, up to which coordinates are followed
 RunOfPiece = Callable[[Scene, np.ndarray, Reached], Motion]  # of a scene, at times (k,), s
 
 
@@ -63,7 +64,7 @@ def simulate_pieces(
     if not scene.has_mass():
         raise SceneError(missing_masses(scene))
     times = samples_at(times, event_times(scene, np.inf))
-    watch = _Watch(scene, lambda scene, times: run(scene, times, None), float(times[-1]))
+    watch = _Watch(scene, lambda scene, times: run(scene, times, None), times)
     begin, ends, stops = 0.0, event_times(scene, float(times[-1])), watch.stops
     piece, pieces, events, turned = first_piece(scene), [], [], dict[str, float]()
     contacts: tuple[str, ...] = ()
@@ -73,9 +74,7 @@ def simulate_pieces(
             piece, contacts, events = after, event.contacts, [event]
     while True:
         end = next((time for time in ends if time > begin), None)
-        last = float(times[-1]) if end is None else end
-        met, names = watch.first_event(piece, contacts, turned, begin, last - begin)
-        end = end if met is None else at_sample(times, begin + met)
+        end, names = watch.next_event(piece, contacts, turned, begin, end)
         own = times[(times >= begin) & (times < end)] if end is not None else times[times >= begin]
         local = own - begin if end is None else np.append(own - begin, end - begin)
         motion = run(
@@ -98,20 +97,44 @@ def simulate_pieces(
 class _Watch:
     """The stops and conditions of a scene, whose signals are followed together."""
 
-    def __init__(self, scene: Scene, run: Callable[[Scene, np.ndarray], Motion], end: float):
-        self._run = run
+    def __init__(self, scene: Scene, run: Callable[[Scene, np.ndarray], Motion], times: np.ndarray):
+        self._run, self._times, end = run, times, float(times[-1])
         self.stops = EndStops(scene, run, end)
         self.conditions = Conditions(scene, run, end, self.stops.length)
         every = constraint_parts(scene)
         self.is_needed = bool(self.stops.sides) or any(each.when or each.release for each in every)
 
-    def first_event(
+    def next_event(
+        self,
+        piece: Scene,
+        contacts: Sequence[str],
+        turned: Mapping[str, float],
+        begin: float,
+        change: float | None,
+    ) -> tuple[float | None, tuple[str, ...]]:
+        """Return the time (s) of the event after a piece that begins at a time (s), up to the next ``change``
+        (s) by an interval, and the names of the stops and constraints that cause it; no time without one.
+
+        A coordinate that reaches its value at a change is found from the motion beyond it. Reactions at a
+        change belong to the next piece.
+        """
+        end = float(self._times[-1])
+        left = end - begin if change is None else change - begin + PAST_CHANGE * end
+        met, names = self._first_event(piece, contacts, turned, begin, left)
+        if met is None or (change is not None and begin + met > change + SAME_ZERO * end):
+            return change, ()
+        if change is None or begin + met < change - SAME_ZERO * end:
+            return at_sample(self._times, begin + met), names
+        held = {each.name for each in constraint_parts(piece)}
+        return change, tuple(name for name in names if name not in held)
+
+    def _first_event(
         self, piece: Scene, contacts: Sequence[str], turned: Mapping[str, float], begin: float, left: float
     ) -> tuple[float | None, tuple[str, ...]]:
         """Return the time (s) in a piece that begins at a time (s) at which a stop is met, a contact would
         pull or a condition is met, and the names of these stops and constraints; no time without one."""
         held = in_contact(piece, contacts)
-        if released := self.conditions.exceeded(piece, held):
+        if released := self.conditions.exceeded(piece, held, left):
             return 0.0, released
         named = [*self.stops.signals(piece, contacts, turned)]
         named += self.conditions.signals(piece, held, turned, begin, left)
@@ -161,9 +184,9 @@ def _event(
     t = float(state.times[0])
     engaged, released = changes(scene, piece, t)
     held = {each.name for each in constraint_parts(piece)}
-    met_by = [each.name for each in constraint_parts(scene) if each.name in met_by]
-    engaged += tuple(name for name in met_by if name not in held)
-    released += tuple(name for name in met_by if name in held and name not in released)
+    met_there = [each for each in constraint_parts(scene) if each.name in met_by]
+    engaged += tuple(each.name for each in met_there if each.name not in held and each.is_active(t))
+    released += tuple(each.name for each in met_there if each.name in {*held} - {*released})
     before, after = next_piece(scene, piece, state, engaged, released)
     try:
         met = stops.meet(in_contact(before, contacts), after, state, contacts)

@@ -15,7 +15,7 @@ import numpy as np
 
 from crosscheck.judge.arithmetic import Arithmetic, doubles
 from crosscheck.judge.constraints import joint_coordinates
-from crosscheck.judge.pieces import State, at_start, changed, events, followed, has_pieces, later
+from crosscheck.judge.pieces import State, at_start, changed, events, followed, has_pieces, later, names_of
 from crosscheck.judge.reference.bounces import Bounces
 from crosscheck.judge.reference.motion import Motion, Times
 from crosscheck.judge.stops import held
@@ -23,6 +23,9 @@ from mbref.scene import Scene, SceneError
 
 Formulation = Callable[..., Motion]
 ROUNDING = 1e-14  # distance of an event from a sample / end time, by rounding
+PAST_CHANGE = 1e-10  # time after a change by an interval / end time, up to which coordinates are followed
+AT_ONCE = 1e-12  # difference of times / end time, by rounding, of a change and a condition that is met there
+Met = tuple[float, tuple[str, ...]] | None
 BETWEEN = 64  # samples of a piece between which turns of joints with loads are counted
 FIELDS = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
 
@@ -51,17 +54,14 @@ def motion_by(
     happened = [0.0] if contacts else []
     while True:
         stop = next((t for t in events(scene, float(wanted[-1])) if t > begin), None)
-        left = (float(wanted[-1]) if stop is None else stop) - begin
+        left = float(wanted[-1]) - begin if stop is None else stop - begin + PAST_CHANGE * wanted[-1]
         try:
             met = bounces.next(piece, contacts, moved, begin, left)
         except SceneError as error:
             found = _later(run(held(piece, contacts), np.zeros(1)), begin, wanted[wanted == begin])
             parts.append(replace(found, reason=error.faults[0]))
             break
-        if met is not None:
-            near = wanted[np.abs(wanted - begin - met[0]) <= ROUNDING * wanted[-1]]
-            stop = float(near[0]) if near.size else begin + met[0]
-        names = () if met is None else met[1]
+        stop, names = _first(piece, wanted, stop, begin, met)
         chosen = wanted[(wanted >= begin) & (wanted < (np.inf if stop is None else stop))]
         own = np.unique([*(chosen - begin), *([] if stop is None else np.linspace(0, stop - begin, BETWEEN))])
         found = run(held(piece, contacts), own)
@@ -77,6 +77,21 @@ def motion_by(
         begin = stop
         happened.append(stop)
     return replace(_joined(parts), events=tuple(happened))
+
+
+def _first(
+    piece: Scene, wanted: np.ndarray, change: float | None, begin: float, met: Met
+) -> tuple[float | None, tuple[str, ...]]:
+    """Return the time (s) of the first event after a piece that begins at a time (s), and the names of the
+    conditions met: a ``change`` by an interval, or an event of ``Bounces``; both at a time that differs by
+    rounding. Reactions at a change belong to the next piece."""
+    at, same = np.inf if met is None else begin + met[0], AT_ONCE * wanted[-1]
+    if met is None or (change is not None and at > change + same):
+        return change, ()
+    if change is not None and at >= change - same:
+        return change, tuple(name for name in met[1] if name not in names_of(piece))
+    near = wanted[np.abs(wanted - at) <= ROUNDING * wanted[-1]]
+    return float(near[0]) if near.size else at, met[1]
 
 
 def _after(

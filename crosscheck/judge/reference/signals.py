@@ -116,13 +116,15 @@ def refuse_open(scene: Scene, seen: Seen) -> None:
     for signal in releases(scene, seen.piece):
         release = next(part.release for part in parts_of(scene) if part.name == signal.name)
         assert release is not None
-        by = release.joint or signal.name
+        by, limit = release.joint or signal.name, release.force or release.moment or 0.0
         shared = shared_wrenches(seen.piece, 0.0, run.position[0], run.orientation[0])[by]
-        wrench = seen.reactions[by][0]
         used = np.zeros(6)
         if release.component is None:
             part = slice(0, 3) if release.force else slice(3, 6)
-            used[part] = wrench[part] / max(float(np.linalg.norm(wrench[part])), 1e-300)
+            pulls = seen.reactions[by][:, part]
+            sizes = np.linalg.norm(pulls, axis=1)
+            first = int(np.argmax(sizes > PULL * limit))  # a joint may be without load at the begin
+            used[part] = pulls[first] / max(float(sizes[first]), 1e-300)
         else:
             used[_place(release)] = 1.0
         if (np.abs(used @ shared) > OPEN).any():

@@ -79,6 +79,40 @@ def test_carts_latch_where_a_travel_or_a_distance_reaches_its_value(when):
     assert motion.joint("L").active.tolist() == [0, 1, 1]
 
 
+def test_carts_latch_at_the_time_at_which_another_joint_lets_go():
+    """The travel of a cart at 2 m/s is 0.2 m at 0.1 s, where the interval of a third body's joint ends. Then
+    both carts move at -0.25 m/s, by their momentum; in the judge's motion, too."""
+    latched, place = carts(active=None, when={"joint": "A", "reaches": 0.2}), (0.0, 0.0, 5.0)
+    other = joint("X", "fixed", "ground", "third", place, active=[[0.0, 0.1]])
+    third = body("third", 1.0, [0.1] * 3, place)
+    scene = latched.with_(body=[*latched.body, third], joint=[*latched.joint, other])
+    motion = mbref.simulate(scene, "taylor", times=[0.0, 0.5])
+    (event,) = motion.events
+    assert (event.time, event.engaged, event.released) == (0.1, ("L",), ("X",))
+    judged = motion_by(natural_motion, scene, [0.0, 0.5], EXTENDED)
+    for velocity in (motion.velocity, judged.velocity):
+        assert np.abs(velocity[-1, :2, 0] + 0.25).max() <= ROUNDED
+
+
+def test_latch_does_not_take_a_coordinate_where_its_own_interval_ends():
+    """The cart has travelled by 0.2 m at 0.1 s; the interval [0 s, 0.1 s) ends before."""
+    motion = mbref.simulate(carts(active=[[0.0, 0.1]], when={"joint": "A", "reaches": 0.2}), "taylor")
+    assert not any(event.engaged for event in motion.events)
+    assert np.abs(motion.velocity[-1, :, 0] - [2.0, -1.0]).max() <= ROUNDED
+
+
+@pytest.mark.parametrize("back", [0.25, 1e-2, 1e-3])
+def test_mass_that_starts_at_the_value_latches_where_it_returns(back):
+    """A mass of 1 kg, pushed by 1 N - 3 N t / back, is at t²/2 (1 - t / back): it returns at ``back``, s."""
+    latch = joint("L", "fixed", "ground", "a", when={"joint": "S", "reaches": 0.0})
+    push = {"type": "joint_force", "joint": "S", "force": 1.0, "factor": {"polynomial": [1.0, -3.0 / back]}}
+    joints = [slide("S", "ground", "a", ORIGIN), latch]
+    mass = body("a", 1.0, [0.1] * 3, ORIGIN)
+    scene = Scene(name="back", duration=1.0, body=[mass], joint=joints, load=[push])
+    (event,) = mbref.simulate(scene, "taylor", times=[0.0, 1.0]).events
+    assert event.engaged == ("L",) and abs(event.time - back) <= ROUNDED
+
+
 @pytest.mark.parametrize("tension", [20.0, (1 - 1e-6) * G * (3 - 2 * np.cos(BEGIN))], ids=["high", "peak"])
 def test_pendulum_released_by_its_tension_falls_freely(tension):
     """A bob of 1 kg on a rope of 1 m starts at rest at θ₀ = 1.2 rad. The tension T = m g (3 cos θ - 2 cos θ₀)
@@ -188,11 +222,16 @@ def test_judge_finds_latches_and_releases_by_itself(scene):
     assert measure(scene, late, truth)["event_time_error"] == pytest.approx(0.01)
 
 
-def test_release_by_a_force_that_redundant_joints_share_is_refused_by_name():
-    """Two welds hold a mass; how they share its weight depends on what is not in the scene."""
+@pytest.mark.parametrize(
+    "factor", [{"polynomial": [1.0]}, {"polynomial": [0.0, 1.0]}], ids=["constant", "ramp"]
+)
+def test_release_by_a_force_that_redundant_joints_share_is_refused_by_name(factor):
+    """Two welds hold a mass; how they share its load, also one that begins at zero, depends on what is not
+    in the scene."""
     welds = [joint("B", "fixed", "ground", "a", release={"force": 1.0}), joint("C", "fixed", "ground", "a")]
     mass = body("a", 1.0, [0.1] * 3, ORIGIN)
-    scene = Scene(name="two", gravity=(0.0, -G, 0.0), body=[mass], joint=welds)
+    load = {"type": "force", "body": "a", "point": ORIGIN, "force": [0.0, -G, 0.0], "factor": factor}
+    scene = Scene(name="two", body=[mass], joint=welds, load=[load])
     says = r"B\.release: redundant constraints leave the force in joint 'B' open"
     with pytest.raises(SceneError, match=says):
         mbref.simulate(scene)
@@ -205,6 +244,7 @@ def test_release_by_a_force_that_redundant_joints_share_is_refused_by_name():
         ({"when": {"joint": "X", "reaches": 1.0}}, "joint[L].when.joint: unknown joint 'X'; known: A, B, L"),
         ({"when": {"joint": "L", "reaches": 1.0}}, "joint[L].when.joint: needs a joint that always holds"),
         ({"when": {"joint": "A", "reaches": "3 deg"}}, "when.reaches: is of the displacement of 'A', got '3"),
+        ({"when": {"joint": "A", "coordinate": ["angle"], "reaches": 1.0}}, "joint[L].when.coordinate: "),
         ({"when": {"reaches": 1.0}}, "joint[L].when: needs a joint, or bodies and points"),
         ({"when": {"bodies": ["one", "two"], "reaches": 1.0}}, "joint[L].when.points: is required for a dis"),
         ({"release": {"force": 1.0, "moment": 1.0}}, "joint[L].release: needs a force or a moment, not both"),
