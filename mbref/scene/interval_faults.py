@@ -12,6 +12,7 @@ from mbref.scene.joints import JOINT_TYPES
 from mbref.scene.units import fits
 
 COMES_AND_GOES = {"active": "intervals", "when": "a condition", "release": "a release"}  # field → its meaning
+ALL_ROTATIONS = 3  # rotations that a joint with a single point leaves free
 
 
 def _text(entry: Any, key: str) -> str:
@@ -92,6 +93,10 @@ def condition_faults(path: str, entry: Any, types: Mapping[str, str]) -> Faults:
             yield f"{path}.release", "needs a force or a moment" + ", not both" * all(given)
         if path.startswith("coupling") and field_of(release, "joint") is None:
             yield f"{path}.release.joint", "is required, a joint whose reaction releases the coupling"
+        by = _text(release, "joint") or _text(entry, "name")
+        kind = types.get(by, "")
+        if given[1] and kind in JOINT_TYPES and JOINT_TYPES[kind].facts.free_rotations == ALL_ROTATIONS:
+            yield f"{path}.release.moment", f"{by!r} is {kind}, whose moment is always zero"
 
 
 def _watched_faults(path: str, when: Any, types: Mapping[str, str]) -> Faults:

@@ -106,7 +106,7 @@ def releases(scene: Scene, piece: Scene) -> Iterator[Signal]:
     for part in parts_of(scene):
         by = part.release and (part.release.joint or part.name)
         if part.release and by and {part.name, by} <= names_of(piece):
-            limit = part.release.force or part.release.moment or 0.0
+            limit = part.release.limit
             yield Signal(part.name, _spare(part.release, by), PULL * limit, True)
 
 
@@ -116,7 +116,7 @@ def refuse_open(scene: Scene, seen: Seen) -> None:
     for signal in releases(scene, seen.piece):
         release = next(part.release for part in parts_of(scene) if part.name == signal.name)
         assert release is not None
-        by, limit = release.joint or signal.name, release.force or release.moment or 0.0
+        by, limit = release.joint or signal.name, release.limit
         shared = shared_wrenches(seen.piece, 0.0, run.position[0], run.orientation[0])[by]
         used = np.zeros(6)
         if release.component is None:
@@ -139,7 +139,7 @@ def _place(release: Release) -> int:
 def _spare(release: Release, by: str) -> Callable[[Seen], np.ndarray]:
     def spare(seen: Seen) -> np.ndarray:
         wrench = seen.reactions[by]
-        limit = release.force or release.moment or 0.0
+        limit = release.limit
         if release.component is not None:
             sign = -1.0 if release.component[0] == "-" else 1.0
             return np.asarray(limit - sign * wrench[:, _place(release)])

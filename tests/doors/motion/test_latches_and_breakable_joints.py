@@ -248,6 +248,10 @@ def test_release_by_a_force_that_redundant_joints_share_is_refused_by_name(facto
         ({"when": {"reaches": 1.0}}, "joint[L].when: needs a joint, or bodies and points"),
         ({"when": {"bodies": ["one", "two"], "reaches": 1.0}}, "joint[L].when.points: is required for a dis"),
         ({"release": {"force": 1.0, "moment": 1.0}}, "joint[L].release: needs a force or a moment, not both"),
+        (
+            {"type": "spherical", "release": {"moment": 1.0}},
+            "release.moment: 'L' is spherical, whose moment is",
+        ),
         ({"release": {"force": 1.0}, "holds_at_start": False}, "holds_at_start: lets it never hold"),
         (
             {"holds_at_start": True},
