@@ -23,6 +23,7 @@ from crosscheck.engine import Cannot, Owner, Setting
 from crosscheck.engines.mujoco.families import STIFFEST
 from crosscheck.engines.mujoco.simulation import Simulation
 from crosscheck.engines.shared.sampling import Sample, run_through, step_count
+from crosscheck.engines.shared.switched import event_between
 from mbref.motions.event import Event
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene, intermittent
@@ -153,23 +154,8 @@ class StoppedRun:
     ) -> Event:
         """Return the event of a contact that ends now and was met at a time (s) in the state ``before``."""
         after = self.run.sample(float(self.run.data.time))
-        return Event(
-            time=met,
-            engaged=(),
-            released=(),
-            position=before.position,
-            orientation=before.orientation,
-            velocity=before.velocity,
-            angular_velocity=before.angular_velocity,
-            velocity_after=after.velocity,
-            angular_velocity_after=after.angular_velocity,
-            angles=angles,
-            impulses={},  # not known by joint
-            open={},
-            energy_before=energy,
-            energy_after=self._energy(),
-            stops=(limit.name,),
-        )
+        energies = energy, self._energy()
+        return event_between(met, before, after, energies, angles=angles, stops=(limit.name,))
 
     def _angles(self) -> dict[str, float]:
         """Return the angles (rad) of the joints with stops, which MuJoCo counts with full turns."""

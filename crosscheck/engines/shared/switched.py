@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,38 @@ def always(scene: Scene) -> Scene:
         body=bodies,
         joint=[joint for joint in scene.joint if joint.active is None],
         coupling=[coupling for coupling in scene.coupling if coupling.active is None],
+    )
+
+
+def event_between(
+    time: float,
+    before: Sample,
+    after: Sample,
+    energies: tuple[float, float],
+    *,
+    engaged: tuple[str, ...] = (),
+    released: tuple[str, ...] = (),
+    angles: Mapping[str, float] = MappingProxyType({}),
+    stops: tuple[str, ...] = (),
+) -> Event:
+    """Return the event of an engine that knows no impulses by joint, from its states before and after, with
+    their kinetic energies (J)."""
+    return Event(
+        time=time,
+        engaged=engaged,
+        released=released,
+        position=before.position,
+        orientation=before.orientation,
+        velocity=before.velocity,
+        angular_velocity=before.angular_velocity,
+        velocity_after=after.velocity,
+        angular_velocity_after=after.angular_velocity,
+        angles=dict(angles),
+        impulses={},
+        open={},
+        energy_before=energies[0],
+        energy_after=energies[1],
+        stops=stops,
     )
 
 
@@ -119,20 +152,12 @@ class SwitchedRun(ABC):
             self.jump(t)
         after = self.sample(t)
         self._found.append(
-            Event(
-                time=t,
+            event_between(
+                t,
+                before,
+                after,
+                (energy, self.energy()),
                 engaged=tuple(part.name for part in engaged),
                 released=tuple(part.name for part in released),
-                position=before.position,
-                orientation=before.orientation,
-                velocity=before.velocity,
-                angular_velocity=before.angular_velocity,
-                velocity_after=after.velocity,
-                angular_velocity_after=after.angular_velocity,
-                angles={},
-                impulses={},  # not known by joint
-                open={},
-                energy_before=energy,
-                energy_after=self.energy(),
             )
         )
