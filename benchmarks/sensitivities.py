@@ -1,10 +1,10 @@
-"""Cost of derivatives over the run without, interleaved in one process.
+"""CPU time of `mbref.sensitivities` over that of the run alone, interleaved in one process.
 
     python benchmarks/sensitivities.py
 
-prints for each scene the CPU time of one run, and that of `mbref.sensitivities` of one output to
-1 and to 10 numbers as multiples of it, with the largest estimated error of a
-derivative over its largest value.
+prints for each scene the CPU time of one run. The CPU times of one output's derivatives to 1 and to 10
+numbers are multiples of it. Beside them stands the largest estimated error of a derivative over the largest
+derivative.
 """
 
 import time

@@ -1,8 +1,7 @@
 """Processes that each make one call after another; a killed process fails its own call only.
 
-Each process answers through a pipe that no other process can write to. The standard library's pool reads
-from a queue that its own process may also write to, so that it waits for ever for the rest of an answer
-whose process was killed while it wrote.
+Each process answers through a pipe of its own. The processes of the standard library's pool answer through
+one queue: where a process is killed while it writes, the pool waits for ever for the rest of the answer.
 """
 
 from __future__ import annotations

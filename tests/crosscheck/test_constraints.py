@@ -69,12 +69,12 @@ class Consistent:
         return terms, block_diag(*(block_diag(np.eye(3), a.T) for a in rotations.to_matrix(p)))
 
     def mbref(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same of mbref's model."""
+        """Constraint values, their Jacobian to world twists (rows, 6 nb), and γ, of mbref's model."""
         terms, back = self.terms_of_mbref()
         return terms.phi, terms.jacobian @ back, terms.gamma
 
     def poses(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same of the judge's joint equations."""
+        """Constraint values, their Jacobian to world twists (rows, 6 nb), and γ, of the judge's equations."""
         place = (self.scene, self.t, self.r, self.p)
         still = np.zeros_like(self.r)
         phi = constraints.closure(*place)
