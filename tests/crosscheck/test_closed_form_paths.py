@@ -59,7 +59,8 @@ BOX = scene(
     ids=["switched moment", "joint torque", "joint force", "table", "armature", "coupling"],
 )
 def test_a_pendulum_with_a_part_outside_its_closed_form_has_none(parts):
-    """The cylindrical joint on the hinge's axis constrains nothing: with it the closed form remains."""
+    """A sleeve, the cylindrical joint B on the hinge's axis, constrains nothing: a pendulum with it has its
+    closed form. A joint force and a coupling act on the sleeve."""
     sleeve = Cylindrical(name="B", bodies=("ground", "bar"), anchor=(0.0, 0.0, 0.5), axis=Z)
     given = PENDULUM.with_(joint=(*PENDULUM.joint, sleeve))
     assert closed_form(given).name == "pendulum"
@@ -68,7 +69,7 @@ def test_a_pendulum_with_a_part_outside_its_closed_form_has_none(parts):
 
 
 def test_a_parallelogram_without_masses_has_a_closed_form_only_if_it_is_driven():
-    """Bodies without masses have no accelerations of their own."""
+    """A driver prescribes the motion of a parallelogram. Without driver it depends on masses."""
     driver = Driver(joint="A", polynomial=(0.0, 1.0))
     plain = tuple(Body(name=b.name, position=b.position) for b in BOX.body)
     assert closed_form(BOX.with_(body=plain)) is None
@@ -164,8 +165,8 @@ def test_path_of_a_spatial_slider_crank_begins_at_the_pose_of_the_scene(line, or
 
 @of_cranks
 def test_only_a_driver_of_the_crank_prescribes_the_path_of_a_spatial_slider_crank(line, order, reverse, way):
-    """`driven_sign` is the sense in which a driver moves the path's angle. A driver of the crank's hinge A
-    has sign 1; one of the slide D prescribes no angle: None."""
+    """`driven_sign` is the sign with which a driver changes the path's angle. The angle is that of the
+    crank's hinge A: sign 1. A driver of the slide D does not prescribe it: None."""
     path = spatial_slider_crank(spatial(line, order, reverse, way))
     assert [path.driven_sign(Driver(joint=name, polynomial=(0.0, 1.0))) for name in "AD"] == [1.0, None]
 
@@ -189,8 +190,8 @@ def test_derivatives_of_the_path_of_a_spatial_slider_crank_are_differences(line,
 
 
 def test_a_weightless_pendulum_turns_at_constant_speed():
-    """2 m at -3 rad/s: 6 m/s, and 18 m/s² towards the hinge, also after a quarter turn at π/6 s. Limits are
-    some thousand roundings."""
+    """Without gravity. The bar's centre is 2 m below the hinge and turns at -3 rad/s: 6 m/s, and 18 m/s²
+    towards the hinge, also after a quarter turn at π/6 s. Limits are some thousand roundings."""
     moving = PENDULUM.with_(body=(body("bar", 0.0, -2.0, 0.5, angular_velocity=(0.0, 0.0, -3.0)),))
     truth = one_dof(moving, parallelogram(moving))
     found = truth.poses(np.array([0.0, math.pi / 6]))

@@ -33,7 +33,8 @@ RANK = 1e-8  # of the largest singular value; poses are consistent to 1e-14
 
 
 class Consistent:
-    """A random state of a scene at time t that meets its constraints: r, p, v, ω (world)."""
+    """A random state at time t that meets the constraints: r, p, v, spin in body axes (omega) and world axes
+    (w). It is the start, disturbed by ``far`` (m, rad) and projected."""
 
     def __init__(self, scene: Scene, t: float, seed: int, far: float):
         rng = np.random.default_rng(seed)
@@ -73,7 +74,7 @@ class Consistent:
         terms, back = self.terms_of_mbref()
         return terms.phi, terms.jacobian @ back, terms.gamma
 
-    def poses(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def judge(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Constraint values, their Jacobian to world twists (rows, 6 nb), and γ, of the judge's equations."""
         place = (self.scene, self.t, self.r, self.p)
         still = np.zeros_like(self.r)
@@ -97,7 +98,7 @@ class Differences(NamedTuple):
 
 def differences(state: Consistent) -> Differences:
     """Compare polynomials, mbref's model and the judge's joint equations."""
-    sets = {"polynomials": state.polynomials(), "mbref": state.mbref(), "poses": state.poses()}
+    sets = {"polynomials": state.polynomials(), "mbref": state.mbref(), "judge": state.judge()}
     spaces, accelerations = {}, {}
     for name, (_, jacobian, gamma) in sets.items():
         _, sizes, rows = np.linalg.svd(jacobian)
@@ -106,7 +107,7 @@ def differences(state: Consistent) -> Differences:
         accelerations[name] = np.linalg.lstsq(jacobian, gamma, rcond=RANK)[0]
     scale = 1 + np.abs(accelerations["polynomials"]).max(initial=0)
     off = [
-        max(np.abs(of[name] - of["polynomials"]).max(initial=0) for name in ("mbref", "poses"))
+        max(np.abs(of[name] - of["polynomials"]).max(initial=0) for name in ("mbref", "judge"))
         for of in (spaces, accelerations)
     ]
     return Differences(max(np.abs(phi).max(initial=0) for phi, _, _ in sets.values()), off[0], off[1] / scale)
@@ -155,25 +156,25 @@ def test_derivatives_of_constraint_polynomials_are_difference_quotients(name: st
 
 @pytest.mark.parametrize("name", ["every_joint", "driven", "five_bar", "spatial_slider_crank_driven"])
 def test_jacobian_of_constraint_polynomials_times_velocities_gives_their_rates(name: str) -> None:
-    """Φ' = Φ_q v - ν, where -ν is Φ' at rest: the drivers' rates. Both sides differ by at most ten times the
-    measured 2.1e-14 m/s or rad/s."""
+    """The rates Φ' are Φ_q times the velocities, plus the drivers' part of Φ', which is Φ' at rest. Both
+    sides differ by at most ten times the measured 2.1e-14 m/s or rad/s."""
     s = Consistent(MECHANISMS[name], 0.002, 7, 0.02)
     c = Constraints(s.scene)
     levels = c.levels(s.t, s.frames)
-    jacobian = c.jacobian(s.t, s.frames)
-    rest = c.levels(s.t, frames(s.r, s.p, 0 * s.v, 0 * s.omega))[1]
-    assert abs(jacobian @ np.hstack([s.v, s.omega]).ravel() + rest - levels[1]).max() < MARGIN * 2.1e-14
+    of_drivers = c.levels(s.t, frames(s.r, s.p, 0 * s.v, 0 * s.omega))[1]
+    rates = c.jacobian(s.t, s.frames) @ np.hstack([s.v, s.omega]).ravel() + of_drivers
+    assert abs(rates - levels[1]).max() < MARGIN * 2.1e-14
 
 
 @pytest.mark.parametrize("name", ["every_joint", "planar_slider_crank_gravity"])
 def test_generalised_forces_of_adapters_equal_mbrefs(name: str) -> None:
-    """Gravity, loads and gyroscopic moments (6 nb,), as forces and moments in world axes. Adapters and mbref
-    share no code here; mbref's bodies have principal frames. They differ by 1e-13 of the largest at most."""
+    """Gravity, loads and gyroscopic moments (6 nb,) in world axes. Adapters and mbref share no code here;
+    mbref's bodies have principal frames. They differ by rounding, 1e-13 of the largest."""
     scene = MECHANISMS[name]
     s = Consistent(scene, 0.0, 3, 0.02)
     forces = Forces(scene)
     angles = np.array([forces.angle(s.frames, k) for k in range(len(forces.twists))])
-    ours = s.to_body.T @ forces(s.frames, s.omega, angles)
+    of_adapters = s.to_body.T @ forces(s.frames, s.omega, angles)
     terms, back = s.terms_of_mbref()
-    theirs = back.T @ terms.force
-    assert abs(ours - theirs).max() / abs(theirs).max() < MARGIN * ROUNDING
+    of_mbref = back.T @ terms.force
+    assert abs(of_adapters - of_mbref).max() / abs(of_mbref).max() < MARGIN * ROUNDING

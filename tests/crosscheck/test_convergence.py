@@ -1,4 +1,4 @@
-"""Orders and limits found in runs made up with a known order, floor and bias, and ladders of steps."""
+"""Orders and Richardson limits of runs made up with a known order, floor and bias; ladders of steps."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from crosscheck.convergence.ladders import MECHANISMS, ROWS, climb, in_vain, ladder
+from crosscheck.convergence.ladders import MECHANISMS, ROWS, TIME_LIMIT, climb, in_vain, ladder
 from crosscheck.convergence.orders import cell, order
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.metrics import error_series
@@ -22,6 +22,7 @@ BENNETT = next(mechanism for mechanism in MECHANISMS if mechanism.scene == "benn
 
 
 def run(step: float, error: float, seconds: float = 0.1, outcome: str = "COMPLETED", **changes) -> dict:
+    """Return the record of a run over 1 s with a step, an error and CPU time."""
     record = {"asked": {"options": {"step": step}}, "outcome": outcome, "t_end": 1.0}
     record["metrics"] = {"error": error, "error_bound": 1e-14}
     return record | {"cost": {"seconds": seconds, "steps": round(1 / step)}} | changes
@@ -35,12 +36,12 @@ def runs(power: float, floor: float, count: int = 12) -> list[dict]:
 @pytest.mark.parametrize("power", [1.0, 2.0, 4.0])
 def test_order_is_the_power_of_the_step_in_errors_above_their_floor(power: float) -> None:
     """``order`` is the slope of log error over log step. Errors are step**power + 1e-9; the floor of 1e-9
-    changes it by less than 0.05."""
+    changes the slope by less than 0.05."""
     assert order(runs(power, 1e-9)) == pytest.approx(power, abs=0.05)
 
 
 def test_two_runs_or_errors_that_do_not_fall_have_no_order() -> None:
-    """Twelve runs with errors step⁴ have one."""
+    """Errors are step⁴ + 1e-9. Twelve runs have an order, the first two alone have none."""
     assert order(runs(4.0, 1e-9)) is not None
     assert order(runs(4.0, 1e-9)[:2]) is None
     assert order([run(0.1 / 2**k, 1e-9) for k in range(5)]) is None
@@ -48,16 +49,17 @@ def test_two_runs_or_errors_that_do_not_fall_have_no_order() -> None:
 
 @pytest.mark.parametrize("power", [1.0, 2.0, 4.0])
 def test_an_error_at_the_bound_of_the_truth_shows_no_order(power: float) -> None:
-    """Three errors of a known order, the last equal to the bound of the truth's error, or 1 % above it."""
-    for least, is_measured in ((1.0, False), (0.99, True)):
-        last = run(0.025, 1e-3) | {"metrics": {"error": 1e-3, "error_bound": least * 1e-3}}
+    """Three errors are made up with a known order. If the last one equals the bound of the truth's error,
+    there is no order; if it is 1 % above the bound, there is one."""
+    for bound, is_measured in ((1e-3, False), (0.99e-3, True)):
+        last = run(0.025, 1e-3) | {"metrics": {"error": 1e-3, "error_bound": bound}}
         line = [run(0.1 / 2**k, 1e-3 * 2 ** (power * (2 - k))) for k in range(2)]
         assert (order([*line, last]) is not None) is is_measured
 
 
 def test_cell_shows_the_least_error_and_the_order() -> None:
-    """An arrow: the finest step has the least error. "<1e-14": the least error is below the bound of the
-    truth. Signs: ! no run completes, – refused, ○ no record."""
+    """Errors are step^power + floor, with the bound 1e-14 of the truth. ↓: the finest step has the least
+    error; <1e-14: the least error is below the bound; ! no run completes; – refused; ○ no record."""
     assert cell(runs(4.0, 3e-12)) == "3e-12 (4.0)"
     assert cell(runs(1.0, 0.0, 6)) == "3e-03 ↓ (1.0)"
     assert cell([*runs(4.0, 0.0, 8), run(1e-4, 2e-15)]) == "<1e-14 (4.0)"
@@ -68,17 +70,16 @@ def test_cell_shows_the_least_error_and_the_order() -> None:
 def test_last_runs_that_lower_the_least_error_by_less_than_30_percent_are_counted() -> None:
     """`in_vain` counts such runs at the end of a ladder. Runs before the first error below 0.5, and runs with
     as many steps as the run before, do not count."""
-    assert in_vain(runs(4.0, 1e-6)[:3]) == 0
-    assert in_vain([run(0.1, 0.5), run(0.05, 0.9), run(0.02, 0.8)]) == 0
+    assert in_vain(runs(4.0, 1e-6)[:3]) == 0, "errors fall by 1/16"
+    assert in_vain([run(0.1, 0.5), run(0.05, 0.9), run(0.02, 0.8)]) == 0, "no error is below 0.5"
     found = [run(0.1, 1e-6), run(0.05, 0.8e-6), run(0.02, 0.9e-6)]
     assert in_vain(found) == 2 and in_vain([*found, run(0.01, 1e-9)]) == 0
-    equal = [run(0.1, 1e-9), *(run(0.1, 1e-9, cost={"seconds": 0.1, "steps": 10}) for _ in range(3))]
-    assert in_vain(equal) == 0
+    assert in_vain([run(0.1, 1e-9)] * 4) == 0, "all runs have ten steps"
 
 
 def test_steps_of_a_ladder_are_halved_and_divide_the_interval_of_samples() -> None:
-    """Bennett's linkage in MuJoCo's family "tuned": more than ten steps. Samples are a tenth of the motion
-    apart, a multiple of the first step."""
+    """The ladder of Bennett's linkage in MuJoCo's family "tuned" has more than ten steps. Eleven samples are
+    a tenth of the motion apart, which is a multiple of the longest step, and so of all."""
     cases = ladder(TUNED_MUJOCO, BENNETT)
     steps = [case.setting.options["step"] for case in cases]
     assert all(a == 2 * b for a, b in pairwise(steps)) and len(steps) > 10
@@ -86,8 +87,8 @@ def test_steps_of_a_ladder_are_halved_and_divide_the_interval_of_samples() -> No
 
 
 def test_a_ladder_ends_where_finer_runs_are_vain_or_would_take_too_long() -> None:
-    """Errors 1e4 h⁴ + 1e-10 reach their floor of 1e-10, after which two runs follow. A run of 1.5 s would
-    take 3 s at half the step, too long, so that it is the last."""
+    """Errors 1e4 h⁴ + 1e-10 reach their floor of 1e-10, after which two runs in vain end the ladder. A run of
+    0.75 TIME_LIMIT is the last, since half the step would take 1.5 TIME_LIMIT."""
     cases = ladder(TUNED_MUJOCO, BENNETT)
 
     def fourth(case: Case) -> dict:
@@ -96,7 +97,7 @@ def test_a_ladder_ends_where_finer_runs_are_vain_or_would_take_too_long() -> Non
 
     found = climb(cases, fourth)
     assert in_vain(found) == 2 and len(found) < len(cases)
-    slow = climb(cases, lambda case: fourth(case) | {"cost": {"seconds": 1.5, "steps": 10}})
+    slow = climb(cases, lambda case: fourth(case) | {"cost": {"seconds": 0.75 * TIME_LIMIT, "steps": 10}})
     assert len(slow) == 1
 
 
@@ -104,10 +105,10 @@ SCENE = SCENES["spatial_slider_crank_driven"]()
 TRUTH = truth_for(SCENE).poses(np.linspace(0, 0.02, 5))
 
 
-def made(step: float, order: float, bias: float, constant: float = 1e-2) -> Trajectory:
-    """A run off the truth by bias + constant · step^order, shifted and turned by as much; the run of step
-    0.1 has quaternions of opposite sign, which are the same orientations."""
-    off = bias + constant * step**order
+def made(step: float, power: float, bias: float) -> Trajectory:
+    """Return a run that is shifted and turned from the truth by bias + 1e-2 · step^power. The run of step 0.1
+    has quaternions of opposite sign, which are the same orientations."""
+    off = bias + 1e-2 * step**power
     turn = rotations.from_vector([0.0, off / 2, 0.0])
     sign = -1.0 if step == 0.1 else 1.0
     shift = off * scene_length(SCENE) * np.array([1.0, 0.0, 0.0])
@@ -116,16 +117,16 @@ def made(step: float, order: float, bias: float, constant: float = 1e-2) -> Traj
     )
 
 
-@pytest.mark.parametrize("order, bias", [(1.0, 1e-4), (2.0, 0.0), (2.0, 3e-5), (4.0, 1e-6)])
-def test_richardson_limit_finds_the_order_and_bias_put_into_the_runs(order: float, bias: float):
-    """The limit is off the truth by the bias, and the finest run (step 0.1) off the limit by 1e-2 ·
-    0.1^order. Both within 1 %, or 1e-8, of this: turns of the runs of long steps are not quite proportional.
-    The order is within a thousandth."""
+@pytest.mark.parametrize("power, bias", [(1.0, 1e-4), (2.0, 0.0), (2.0, 3e-5), (4.0, 1e-6)])
+def test_richardson_limit_finds_the_order_and_bias_put_into_the_runs(power: float, bias: float):
+    """Runs at four steps h are off the truth by bias + 1e-2 h^power. Their limit is off by the bias, and the
+    finest run (h = 0.1) is off the limit by 1e-2 · 0.1^power. Both hold within 1 %, or 1e-8, since large
+    turns are not quite proportional to off; the order is within a thousandth."""
     steps = [0.1, 0.3, 1.0, 0.2]
-    found = limit(SCENE, steps, [made(h, order, bias) for h in steps])
+    found = limit(SCENE, steps, [made(h, power, bias) for h in steps])
     error = error_series(SCENE, found.motion, TRUTH).max()
-    assert found.order == pytest.approx(order, rel=1e-3), found.order
-    assert found.discretisation == pytest.approx(1e-2 * 0.1**order, rel=1e-2), found.discretisation
+    assert found.order == pytest.approx(power, rel=1e-3), found.order
+    assert found.discretisation == pytest.approx(1e-2 * 0.1**power, rel=1e-2), found.discretisation
     assert error == pytest.approx(bias, rel=1e-2, abs=1e-8), f"limit off by {error:.2e}, bias put in {bias:g}"
 
 
@@ -134,11 +135,11 @@ WANDERING = [made(h, 1.0, off) for h, off in zip(STEPS, (0.0, 1e-3, -2e-2), stri
 
 
 @pytest.mark.parametrize(
-    "runs",
+    "given",
     [WANDERING, [made(0.5, 1.0, 1e-3)] * 3, [made(h, 1.0, 0.0) for h in STEPS[:2]]],
     ids=["differences that grow", "equal runs", "two runs"],
 )
-def test_runs_that_follow_no_power_of_the_step_have_no_limit(runs):
-    """Runs off the truth by constant · step¹ have one."""
+def test_runs_that_follow_no_power_of_the_step_have_no_limit(given):
+    """Three runs at halved steps, off the truth by 1e-2 · step, have a limit."""
     assert limit(SCENE, STEPS, [made(h, 1.0, 0.0) for h in STEPS]) is not None
-    assert limit(SCENE, STEPS[: len(runs)], runs) is None
+    assert limit(SCENE, STEPS[: len(given)], given) is None

@@ -1,4 +1,4 @@
-"""The judge's residuals, rates, loads and terms against formulas and differences."""
+"""The judge's functions of time, residuals, turns and terms against formulas, SciPy and sums by hand."""
 
 import math
 
@@ -29,9 +29,9 @@ TABLE = ((0.0, 0.0), (0.3, 0.2), (0.5, -0.1), (0.9, 0.4), (1.4, 0.0))
 @pytest.mark.parametrize("derivative", range(4))
 @pytest.mark.parametrize("rows", [TABLE, TABLE[:4]])
 def test_a_table_of_a_driver_is_joined_by_scipys_cubic_spline(derivative, rows):
-    """The spline's third derivative is continuous at the second row from each end (not-a-knot). Both differ
-    by 1e-11 at most: rounding, 1e-16, over the shortest interval, 0.2 s, cubed, times a margin. Pieces end at
-    inner rows."""
+    """SciPy's spline is not-a-knot, as the judge's: the third derivative is continuous at the second row from
+    each end. Both differ by at most 1e-11 in all derivatives; rounding over the cube of the shortest
+    interval, 1e-16 / 0.2³, is 1e-14. Pieces of the function end at inner rows."""
     law, spline = Driver(joint="J", table=rows), CubicSpline(*zip(*rows, strict=True))
     t = np.array([0.01, 0.15, 0.3, 0.45, 0.5, 0.7, rows[-1][0] - 0.01])
     assert time_functions.value(law, t, derivative) == pytest.approx(spline(t, derivative), abs=1e-11)
@@ -42,8 +42,8 @@ FACTOR = {"polynomial": [1.0, 2.0], "start": 0.4, "stop": 0.8}  # 1 + 2 t from 0
 
 
 def test_pieces_of_a_scenes_functions_end_at_rows_of_tables_and_at_start_and_stop():
-    """A driver's table with inner rows at 0.3, 0.5 and 0.9 s, a moment with FACTOR from 0.4 to 0.8 s, and a
-    constant moment, which has one piece without end."""
+    """``next_end`` is the first end of a piece after a time. The scene has a driver's table with inner rows
+    at 0.3, 0.5 and 0.9 s, a moment with FACTOR from 0.4 to 0.8 s, and a constant moment, which has no end."""
     scene = Scene(
         name="s",
         body=(body(),),
@@ -57,8 +57,8 @@ def test_pieces_of_a_scenes_functions_end_at_rows_of_tables_and_at_start_and_sto
 
 
 def test_factor_is_zero_outside_its_piece_and_has_the_piece_s_value_at_its_end():
-    """1 + 2 t is 1.8 at 0.4 s and 2.58 at 0.79 s. At 0.8 s the factor is 0; as the end of the piece that
-    began at 0.4 s it is 2.6."""
+    """1 + 2 t is 1.8 at 0.4 s, 2.58 at 0.79 s and 2.6 at 0.8 s, where the piece from 0.4 s ends. From 0.8 s
+    on the factor is 0. With ``since`` 0.4 the function returns the value of the piece at its end."""
     factor = Moment(body="b", moment=X, factor=FACTOR).factor
     t = np.array([0.39, 0.4, 0.79, 0.8, 1.0])
     assert time_functions.value(factor, t) == pytest.approx([0.0, 1.8, 2.58, 0.0, 0.0])
@@ -66,7 +66,7 @@ def test_factor_is_zero_outside_its_piece_and_has_the_piece_s_value_at_its_end()
 
 
 def residual(given: dict, place, q) -> list[float]:
-    """Return residuals (m, rad) of a joint between the ground and a body at a pose, for an anchor at 0."""
+    """Return residuals (m, rad) of a joint at the origin after its body has moved and turned."""
     scene = Scene(name="s", body=(body(),), joint=(given,))
     pose = with_ground(np.array([place], dtype=float), np.array([q], dtype=float))
     return position_rows(joint_frames(scene)[0], np.zeros(()), *pose).tolist()
@@ -83,8 +83,8 @@ def at_origin(kind: str, **fields) -> dict:
 
 
 def test_residuals_of_joints_are_displacements_and_angles_that_they_prevent():
-    """A joint along z measures displacements along y, -x and z, then angles about y, -x and z. The body has
-    moved by 0.1 m along x, 0.2 m along y and 0.3 m along z, and has turned about one axis."""
+    """The body has moved by (0.1, 0.2, 0.3) m and turned about one axis. A joint along z has residuals along
+    y, -x and z, and then about y, -x and z, as far as it prevents them."""
     moved = (0.1, 0.2, 0.3)
     fixed, hinge = at_origin("fixed"), at_origin("revolute", axis=Z)
     assert residual(fixed, moved, about(Y, 0.4)) == pytest.approx([0.2, -0.1, 0.3, 0.4, 0.0, 0.0])
@@ -104,20 +104,22 @@ SAMPLED = 0.2 * np.arange(6)  # s
 
 @pytest.mark.parametrize(("rate", "known"), [(15.6, 6), (15.8, 3)])
 def test_turns_are_unknown_where_rates_near_a_step_differ_by_half_a_turn(rate, known):
-    """Six samples 0.2 s apart at angle 0. The last rate times 0.2 s is 3.12 or 3.16 rad: below or above π,
-    half a turn. Above it, the last step and the two before, whose rates are estimated from it, have unknown
-    turns."""
+    """Six samples 0.2 s apart have the angle 0 and rates 0, except the last rate: times 0.2 s it is 3.12 or
+    3.16 rad, below or above half a turn π. Above it, turns are unknown in the last step and in the two
+    before, whose rates are estimated from it."""
     found = joint_coordinates.counted(SAMPLED, 0 * SAMPLED, np.array([0.0, 0.0, 0.0, 0.0, 0.0, rate]))
     assert np.isnan(found).tolist() == [False] * known + [True] * (6 - known)
 
 
 def at_rest(scene: Scene):
-    """Return r, q, v, ω and the turned angles of loads: none moves or is turned, and no load has an angle."""
+    """Return r, q, v, ω of unturned bodies at rest, and no angles (0,) of loads, which the scene lacks."""
     places = np.array([b.position for b in scene.body])
     return places, np.tile(UNIT, (len(places), 1)), 0 * places, 0 * places, np.zeros(0)
 
 
 def pendulum() -> Scene:
+    """Return a body of 2 kg, 0.5 kg m² about z, 1 m along x from its hinge, that turns at 2 rad/s; with a
+    force of 1.5 N at its centre and a torsion spring with damper."""
     hinge = Revolute(name="J", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
     spring = TorsionSpring(joint="J", stiffness=3.0, damping=0.5, natural_angle=0.1)
     pull = Force(body="b", point=(1.0, 0.0, 0.0), force=(0.0, 1.5, 0.0))
@@ -133,9 +135,9 @@ def pendulum() -> Scene:
 
 
 def test_terms_of_a_pendulum_are_its_forces_mass_and_constraint_rows():
-    """2 kg at 1 m along x from the hinge and 2.5 kg m² about it; it turns at 2 rad/s. Moments: weight -18,
-    force 1.5, spring 3 N m/rad · 0.1 rad, damper -0.5 N m s/rad · 2 rad/s. They sum up to the acceleration
-    about z."""
+    """Moments about the hinge: weight -18 N m, force 1.5 N m, spring 3 · 0.1 N m, damper -0.5 · 2 N m. Over
+    0.5 + 2 · 1² = 2.5 kg m² their sum is the acceleration about z. The centre has ω² r = 4 m/s² towards the
+    hinge."""
     scene = pendulum()
     terms = terms_at(scene, gauss_motion(scene, (0.0,)), 0)
     assert list(terms.forces) == [
@@ -156,15 +158,15 @@ def test_terms_of_a_pendulum_are_its_forces_mass_and_constraint_rows():
         assert force == pytest.approx(np.array(expected, dtype=float), abs=1e-14)  # N, N m
     assert np.diag(terms.mass) == pytest.approx([2, 2, 2, 0.3, 0.4, 0.5]) and terms.mass[3, 4] == 0.1
     assert terms.joints == ("J",) * 5 and terms.rows.shape == (5, 6) and not terms.of_drivers.any()
-    assert np.linalg.norm(terms.of_velocities) == pytest.approx(4.0), "ω² r towards the hinge"
+    assert np.linalg.norm(terms.of_velocities) == pytest.approx(4.0)
     found = of_terms(scene, terms)
     assert found[5] == pytest.approx((-18 + 1.5 + 0.3 - 1.0) / 2.5)
     assert found[:3] == pytest.approx([-4.0, found[5], 0.0])
 
 
 def test_a_massless_link_does_not_change_the_acceleration_of_a_pendulum():
-    """A pendulum of 2 kg and 0.5 kg m² at 1 m falls with 18 / 2.5 = 7.2 rad/s², alone and welded to a
-    massless link that is hinged to the ground."""
+    """From rest the pendulum falls with 18 N m / 2.5 kg m² = 7.2 rad/s², hinged to the ground or welded to a
+    massless link that is."""
     scene = pendulum().with_(load=())
     assert accelerations(scene, 0.0, at_rest(scene))[0] == pytest.approx(
         [0.0, -7.2, 0.0, 0.0, 0.0, -7.2], abs=1e-12

@@ -40,6 +40,8 @@ DRIVER = Driver(joint="crank", polynomial=(0.0, 1.0))
 
 
 def replayed(*moments: float, **parts: Any) -> Scene | Outside:
+    """Return the scene in which the driver of hinge "crank" is replaced by its moment in a run, whose samples
+    have these moments about z. Reactions of the shaft are other ones."""
     given = {"joint": (SHAFT, CRANK), "driver": (DRIVER,), **parts}
     pull = np.array([[1.0, 2.0, 3.0, 40.0, 50.0, moment] for moment in moments])
     return replays.replayed(scene(**given), motion(reactions={"shaft": 7 * pull, "crank": pull}))
@@ -47,8 +49,9 @@ def replayed(*moments: float, **parts: Any) -> Scene | Outside:
 
 @pytest.mark.parametrize("size", [4.0, -4.0, 0.0])
 def test_constant_driving_moment_replaces_the_driver(size):
-    """Moments of ±4 or 0 N m about z vary by 0.9e-6 (1e-6 is allowed): their mean replaces the driver. The
-    axis's length of 2 has no effect. Other loads stay; bodies start with the run's velocities."""
+    """The driver's moment is 4, -4 or 0 N m about z and varies by 0.9e-6 of itself (1e-6 is allowed): its
+    mean replaces the driver. Other loads stay, and bodies start with the velocities of the run. That the
+    hinge's axis has the length 2 has no effect."""
     found = replayed(size, size * (1 + 0.9e-6), load=(Moment(body="c", moment=X),))
     assert [load.body for load in found.load] == ["c", "b"] and not found.driver
     assert found.load[1].moment == pytest.approx((0.0, 0.0, size * (1 + 0.45e-6)), rel=1e-9)
@@ -58,7 +61,7 @@ def test_constant_driving_moment_replaces_the_driver(size):
 
 @pytest.mark.parametrize("size", [4.0, -4.0])
 def test_driving_moment_that_varies_by_over_1e_6_is_refused(size):
-    """Moments at two samples differ by 1.1e-6 of themselves."""
+    """The moments at both samples differ by 1.1e-6 of themselves."""
     assert "varies" in replayed(size, size * (1 + 1.1e-6)).reason
 
 
@@ -89,8 +92,8 @@ def still(*bodies: Body, **parts: Any) -> Scene:
 
 
 def test_a_body_is_not_split_if_a_name_is_taken_or_a_half_is_too_thin():
-    """Another body has the name "b half". Half of the thin body would have 0.75 of the smallest moment of
-    inertia that a scene takes (SMALLEST, kg m²)."""
+    """The half of body b is named "b half", which another body has. The thin body has 1.5 times the smallest
+    moment of inertia that a scene takes (SMALLEST, kg m²); its half would have 0.75 times."""
     taken = rewritings.split(still(block("b half"), block()))
     assert isinstance(taken, Outside) and taken.reason.startswith("the halves are not valid bodies: ")
     assert "b half" in taken.reason
@@ -100,8 +103,8 @@ def test_a_body_is_not_split_if_a_name_is_taken_or_a_half_is_too_thin():
 
 @pytest.mark.parametrize(("off", "is_split"), [(2e-12, True), (8e-12, False)])  # m/s
 def test_a_body_is_split_only_if_its_velocity_meets_the_joint_to_rounding(off, is_split):
-    """A hinge at the origin, 2 rad/s: the centre at (1, 2, 0) moves at (-4, 2, 0) m/s. Up to 1e-12 of its
-    largest component, 4 m/s, counts as rounding."""
+    """On a hinge at the origin at 2 rad/s, the centre at (1, 2, 0) m moves at (-4, 2, 0) m/s. The body's
+    velocity is ``off`` from this; up to 1e-12 of the largest component, 4e-12 m/s, counts as rounding."""
     hinge = Revolute(name="J", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=Z)
     spun = block(velocity=(-4.0, 2.0 + off, 0.0), angular_velocity=(0.0, 0.0, 2.0))
     found = rewritings.split(still(spun, joint=(hinge,)))

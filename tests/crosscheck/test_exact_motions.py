@@ -1,4 +1,4 @@
-"""Gauss's principle, integrated, gives the motion of closed forms."""
+"""Gauss's principle, integrated, gives the motions of closed forms, of SciPy and of the judge's reference."""
 
 import numpy as np
 import pytest
@@ -36,8 +36,8 @@ def test_gausss_principle_gives_the_true_motion(name):
 
 @pytest.mark.parametrize("name", ["point_pendulum", "bricard_thin"])
 def test_gausss_principle_accelerates_bodies_without_moments_of_inertia_as_the_reference(name):
-    """Their mass matrix is singular and has no Cholesky factor. The reference solves equations of its own in
-    long doubles; differences are rounding (1e-12 of the largest acceleration)."""
+    """The mass matrix of such bodies is singular and has no Cholesky factor. The judge's reference has other
+    equations, solved in long doubles. Differences are rounding, 1e-12 of the largest acceleration."""
     scene = SCENES[name]()
     motion = natural_motion(scene, [0.0], EXTENDED, seconds=100.0)
     angular = scene_length(scene) * motion.angular_acceleration[0]
@@ -46,35 +46,35 @@ def test_gausss_principle_accelerates_bodies_without_moments_of_inertia_as_the_r
 
 
 def test_gausss_principle_turns_a_free_asymmetric_top_by_jacobis_elliptic_functions():
-    """Euler's solution of the angular velocity about body axes: cn, sn and dn (Landau, Lifshitz, § 37), to
-    1e-8 rad/s, the accuracy of the integration."""
+    """Euler's equations give the angular velocity about body axes by cn, sn and dn (Landau and Lifshitz,
+    Mechanics, § 37). They agree to 1e-8 rad/s, the accuracy of the integration."""
     moments, spin = np.array([0.02, 0.03, 0.045]), np.array([4.0, 0.0, 5.0])
     at_rest = {"position": (0.0, 0.0, 0.0), "velocity": (0.0, 0.0, 0.0)}
     body = Body(name="top", mass=1.0, inertia=moments, angular_velocity=spin, **at_rest)
     scene, times = Scene(name="top", duration=1.0, body=(body,)), np.linspace(0.0, 1.0, 6)
-    energy2, momentum2 = moments @ spin**2, np.sum((moments * spin) ** 2)
-    a, b, c = moments[::-1]  # of largest, middle, least moment, for momentum² > energy × the middle
-    assert momentum2 > energy2 * b
-    rate = np.sqrt((a - b) * (momentum2 - energy2 * c) / (a * b * c))
-    modulus = (b - c) * (energy2 * a - momentum2) / ((a - b) * (momentum2 - energy2 * c))
-    sn, cn, dn, _ = ellipj(rate * times, modulus)
-    least = np.sqrt((energy2 * a - momentum2) / (c * (a - c))) * cn
-    middle = np.sqrt((energy2 * a - momentum2) / (b * (a - b))) * sn
-    largest = np.sqrt((momentum2 - energy2 * c) / (a * (a - c))) * dn
-    exact = np.stack([least, middle, largest], axis=1)
+    twice_energy, momentum2 = moments @ spin**2, np.sum((moments * spin) ** 2)  # 2 T and L²
+    a, b, c = moments[::-1]  # largest, middle and least moment
+    assert momentum2 > twice_energy * b, "this form of the solution holds for L² > 2 T b"
+    rate = np.sqrt((a - b) * (momentum2 - twice_energy * c) / (a * b * c))
+    parameter = (b - c) * (twice_energy * a - momentum2) / ((a - b) * (momentum2 - twice_energy * c))
+    sn, cn, dn, _ = ellipj(rate * times, parameter)
+    about_c = np.sqrt((twice_energy * a - momentum2) / (c * (a - c))) * cn
+    about_b = np.sqrt((twice_energy * a - momentum2) / (b * (a - b))) * sn
+    about_a = np.sqrt((momentum2 - twice_energy * c) / (a * (a - c))) * dn
+    exact = np.stack([about_c, about_b, about_a], axis=1)
     run = gauss_motion(scene, tuple(times.tolist()))
     seen = rotations.rotate(rotations.conjugate(run.orientation[:, 0]), run.angular_velocity[:, 0])
     assert np.abs(seen - exact).max() < INTEGRATED, np.abs(seen - exact).max()
 
 
 def test_gausss_principle_gives_the_nutation_of_a_heavy_symmetric_top():
-    """Lagrange's top: one equation of second order in the polar angle θ, with constant momenta p_φ and p_ψ,
-    which SciPy integrates. The top has 0.15 m, 1 kg, 0.02 and 0.012 kg m², and starts at 0.6 rad. Angles
-    differ by less than 1e-8 rad, the accuracy of the principle's integration."""
+    """Lagrange's top has one equation of second order in the polar angle θ, with constant momenta p_φ and
+    p_ψ, which SciPy integrates. Angles differ by less than 1e-8 rad, the accuracy of the principle's
+    integration. The top has 0.15 m, 1 kg, 0.02 and 0.012 kg m²."""
     scene = heavy_top()
-    about, own, arm, weight = 0.02 + 0.15**2, 0.012, 0.15, 9.81
+    about, own, arm, weight = 0.02 + 0.15**2, 0.012, 0.15, 9.81  # across at the support; about the axis
     turned = rotations.from_vector(np.array([0.6, 0.0, 0.0]))
-    spin = np.array([0.5, 1.0, 40.0])  # rad/s at the start, about the top's axes; θ' is the first
+    spin = np.array([0.5, 1.0, 40.0])  # rad/s at the start (θ = 0.6), about the top's axes; θ' is the first
     momentum = rotations.rotate(turned, np.array([about, about, own]) * spin)
     p_phi, p_psi = momentum[2], own * spin[2]
 
@@ -91,7 +91,8 @@ def test_gausss_principle_gives_the_nutation_of_a_heavy_symmetric_top():
 
 
 def test_moving_probes_of_the_suite_begin_with_closed_joints_and_a_rotating_body():
-    """Violations of positions, velocities and accelerations are below 1e-9; a body has above 0.3 rad/s."""
+    """Violations of positions, velocities and accelerations are below 1e-9 in every scene, and a body turns
+    at more than 0.3 rad/s, so that velocity terms matter."""
     for scene in PROBES.values():
         start = gauss_motion(scene, (0.0,))
         assert max(float(violation_series(scene, start, level).max()) for level in (0, 1, 2)) < 1e-9
