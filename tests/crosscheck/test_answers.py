@@ -17,25 +17,25 @@ from tests.helpers.fake_engines import DAMAGES, FAKE, FAKES, MALFORMED, SCALARS
 TIMES = np.array([0.0, 0.1, 0.3])
 BLOCK = Body(name="block", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(1.0, 2.0, 3.0))
 SCENE = Scene(name="still", body=(BLOCK,))
-SAYS = {  # function of DAMAGES, named by what it changes in a good answer: the words of the error
-    "nothing": "returned NoneType, not a Trajectory",
-    "a table": "returned dict, not a Trajectory",
-    "an engine": "not a Trajectory",
-    "no outcome": "outcome: is 'COMPLETED'",
+SAYS = {  # key of DAMAGES, the defect that it puts into a good answer: words of the error
+    "None": "returned NoneType, not a Trajectory",
+    "a dictionary": "returned dict, not a Trajectory",
+    "a class": "not a Trajectory",
+    "outcome as text": "outcome: is 'COMPLETED'",
     "other bodies": "bodies: are ('someone',)",
     "no bodies": "bodies: are None",
     "other times": "times: are not the first of the requested times",
     "few samples": "times: completed with 1 of 3 samples",
     "few positions": "position: has shape (1, 1, 3), not (3, 1, 3)",
     "wrong shape": "position: has shape (3, 3), not (3, 1, 3)",
-    "text": "velocity: is str, not an array of numbers",
-    "ragged": "velocity: is list, not an array of numbers",
+    "velocity as text": "velocity: is str, not an array of numbers",
+    "ragged velocity": "velocity: is list, not an array of numbers",
     "no rotation": "orientation: has a quaternion",
     "unknown joint": "reactions: name joints that",
-    "no cost": "cost: is float, not a Cost",
+    "cost as a number": "cost: is float, not a Cost",
     "cost of NaN": "cost: is not finite",
     "another scene": "scene: is 'moving', not 'still'",
-    "no version": "version: is empty",
+    "blank version": "version: is empty",
     "negative cost": "cost: is negative",
     "settings of objects": "settings: must be a dictionary",
     "a local class": "returned Local, not a Trajectory",
@@ -44,7 +44,7 @@ SAYS = {  # function of DAMAGES, named by what it changes in a good answer: the 
 
 @pytest.mark.parametrize(("damage", "words"), [(damage, SAYS[damage]) for damage in DAMAGES])
 def test_error_of_a_malformed_answer_names_its_defect(damage: str, words: str):
-    """The engine MALFORMED gives a good answer with the one change that ``damage`` names."""
+    """The engine MALFORMED gives a good answer with the one defect that ``damage`` names."""
     with pytest.raises(MalformedAnswer) as caught:
         well_formed(MALFORMED.run(SCENE, TIMES, Setting("a", {"damage": damage})), SCENE, TIMES)
     assert words in str(caught.value)
@@ -67,8 +67,7 @@ def test_a_completed_run_of_zero_seconds_is_a_well_formed_answer():
 
 
 def test_numbers_of_numpy_in_an_answer_become_floats_and_ints():
-    """The engine SCALARS answers with numpy's numbers, such as 7 steps, and with lists of velocities and
-    bodies."""
+    """SCALARS answers with numpy's numbers, such as 7 steps, and lists of velocities and bodies."""
     run = well_formed(SCALARS.run(SCENE, TIMES, Setting("a")), SCENE, TIMES)
     assert json.loads(json.dumps(run.to_record()))["cost"]["steps"] == 7
     kinds = [type(x) for x in (run.t_end, run.cost.seconds, run.cost.steps, run.settings["seconds"])]
@@ -77,9 +76,10 @@ def test_numbers_of_numpy_in_an_answer_become_floats_and_ints():
 
 
 def test_a_study_records_malformed_answers_as_crashed_and_goes_on(tmp_path: Path):
-    """VERSIONLESS raises the error "no licence" where its version is read; SCALARS are numbers of numpy."""
+    """MALFORMED gives an answer with the defect that its option names. SCALARS answers with numpy's numbers,
+    which are accepted. VERSIONLESS raises the error "no licence" when its version is read."""
     wanted = [  # engine, its options, the outcome in its record
-        ("MALFORMED", {"damage": "nothing"}, "CRASHED"),
+        ("MALFORMED", {"damage": "None"}, "CRASHED"),
         ("MALFORMED", {"damage": "few samples"}, "CRASHED"),
         ("SCALARS", {}, "COMPLETED"),
         ("VERSIONLESS", {}, "CRASHED"),
@@ -87,7 +87,7 @@ def test_a_study_records_malformed_answers_as_crashed_and_goes_on(tmp_path: Path
         ("FAKE", {}, "COMPLETED"),
     ]
     cases = [Case(SCENE, TIMES, f"{FAKES}:{name}", Setting("a", options)) for name, options, _ in wanted]
-    records = study(cases, None, tmp_path / "records.jsonl")
+    records = study(cases, records_path=tmp_path / "records.jsonl")
     assert [record["outcome"] for record in records] == [outcome for *_, outcome in wanted]
     assert "no licence" in records[3]["message"], "the error that ``version`` raises"
     assert len((tmp_path / "records.jsonl").read_text().splitlines()) == 6

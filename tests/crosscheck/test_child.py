@@ -38,7 +38,7 @@ def test_calls_share_a_process_but_no_folder_and_no_printed_text(child: Child):
 
 
 def test_a_silent_call_after_a_long_output_has_no_output(child: Child):
-    """``converse`` prints 200 characters; the sum of the next call comes without printed text and files."""
+    """The first call prints 200 characters; the next has its value 2 + 3, no printed text and no files."""
     child.call(converse, ("word " * 40,), 60.0)
     assert child.call(operator.add, (2, 3), 60.0) == (5, "", ())
 
@@ -52,7 +52,7 @@ def test_a_child_has_the_environment_variables_of_its_parent_when_it_starts(monk
 
 
 def test_a_call_that_raises_ends_its_child_as_crashed(child: Child):
-    """1 / 0 raises; a next call in this process would find remains of the failed one."""
+    """The call 1 / 0 raises. Its process ends, because a next call could find remains of the failed one."""
     with pytest.raises(ChildFailed, match="ZeroDivisionError: division by zero") as raised:
         child.call(operator.truediv, (1, 0), 60.0)
     assert raised.value.outcome is Outcome.CRASHED
@@ -62,7 +62,7 @@ def test_a_call_that_raises_ends_its_child_as_crashed(child: Child):
 @pytest.mark.parametrize("in_copy", [False, True], ids=["in the child", "in a forked copy"])
 @pytest.mark.parametrize("work", ["time.sleep(60)", "3 ** 10**9"], ids=["sleeps", "computes for hours"])
 def test_a_call_past_its_limit_times_out_and_its_processes_end(child: Child, tmp_path, work, in_copy: bool):
-    """The call writes its process number, then works past 0.5 s. The child ends, and so does its copy."""
+    """The call writes its process number, then works past 0.5 s. The child and its forked copy end."""
     number = child.call(os.getpid, (), 60.0).value  # the limit does not cover the start of the process
     text = f"import os, pathlib, time; pathlib.Path({str(tmp_path / 'pid')!r}).write_text(str(os.getpid()))"
     with pytest.raises(ChildFailed, match=r"no result after 0\.5 s") as raised:
@@ -86,8 +86,8 @@ def test_value_that_cannot_be_sent_is_a_failed_call(child: Child):
 
 
 def test_the_command_line_computes_with_one_thread_unless_the_user_sets_a_number():
-    """The user sets OpenMP's number to 3, and OpenBLAS' becomes 1. Variables are set before numpy is
-    imported, which reads them once."""
+    """The user sets only OpenMP's number, to 3; OpenBLAS' becomes 1. Variables must be set before numpy is
+    imported, which reads them once: ``import crosscheck`` imports no numpy."""
     known = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
     code = "import os, sys, crosscheck; assert 'numpy' not in sys.modules; import crosscheck.cli\n"
     code += "print(os.environ['OMP_NUM_THREADS'], os.environ['OPENBLAS_NUM_THREADS'])"

@@ -65,7 +65,7 @@ def test_json_of_a_run_has_the_fields_of_a_record_and_the_engines_states(capsys,
     assert len(document["records"]) == 2, [r["settings"] for r in document["records"]]
     for record, seconds in zip(document["records"], (0.1, 0.2), strict=True):
         assert list(record) == FIELDS and set(record["cost"]) == COST, record
-        assert record["cost"]["seconds"] == seconds == record["settings"]["seconds"], record
+        assert (record["cost"]["seconds"], record["settings"]["seconds"]) == (seconds, seconds), record
         assert (record["engine"], record["version"], record["method"]) == ("fake", "1.2.3", "plain"), record
         assert record["times"] == [0.0, 0.1, 0.3] and record["t_end"] == 0.3, record["times"]
         assert record["bodies"]["block"]["position"] == [[1.0, 2.0, 3.0]] * 3, record["bodies"]
@@ -86,20 +86,20 @@ def two(tmp_path, monkeypatch) -> tuple[str, ...]:
 
 
 def test_a_scene_without_a_closed_form_is_judged_by_its_reference(capsys, two):
-    """Two bodies that are left at rest have no error; the reference has the least bound that is stated,
-    1e-14."""
+    """FAKE leaves two bodies at rest, where no force acts: its error is zero. The bound of the reference's
+    error is the least one that the judge states, 1e-14."""
     _, out, _ = run_main(capsys, *two, "--json")
     measured = [record["metrics"] for record in json.loads(out)["records"]]
     assert [(m["error"], m["error_bound"]) for m in measured] == [(0.0, 1e-14)] * 2, measured
 
 
 def test_table_of_runs_shows_an_error_below_the_bound_of_the_truth_as_the_bound(capsys, two):
-    """FAKE has two runs without error of a scene whose truth is known to 1e-14."""
+    """Both runs of FAKE have the error 0; the truth of the scene is known to 1e-14."""
     assert run_main(capsys, *two)[1].count("< 1e-14") == 2
 
 
 def test_reference_time_of_zero_leaves_the_error_unknown_and_says_why(capsys, two):
-    """No closed form of the scene is known, so that only a reference could be its truth."""
+    """No closed form of the scene is known: only a reference, here in 20 s, can be its truth."""
     _, out, _ = run_main(capsys, *two, "--reference-time", "0", "--json")
     assert json.loads(out)["records"][0]["metrics"]["error"] is None
     sentence = "There is no reference for two: no reference was requested."
@@ -108,7 +108,7 @@ def test_reference_time_of_zero_leaves_the_error_unknown_and_says_why(capsys, tw
 
 
 def test_json_of_two_scenes_is_a_list_in_their_order(capsys, tmp_path):
-    """Still scenes of 0.5 s; the engine FAKE offers three settings."""
+    """Scenes "b" and "a", in this order. FAKE has three settings of its families plain and noisy."""
     paths = [saved(tmp_path, "b"), saved(tmp_path, "a")]
     status, out, _ = run_main(capsys, "run", *paths, "--engine", FAKE, "--samples", "3", "--json")
     documents = json.loads(out)
@@ -143,7 +143,7 @@ def test_a_faulty_option_is_refused_with_status_two_and_its_reason(capsys, still
 
 
 def test_every_fault_of_a_scene_file_is_reported_with_its_line(capsys, tmp_path):
-    """Gravity is in line 2 and the body's mass in line 5 of its table, which begins in line 3."""
+    """Gravity is in line 2, the body's table begins in line 3, and its mass is in line 5."""
     path = tmp_path / "bad.toml"
     path.write_text(
         'name = "bad"\ngravity = [0, 0]\n[[body]]\nname = "a"\nmass = -1.0\nposition = [0, 0, 0]\n'
@@ -242,12 +242,12 @@ def test_list_names_every_scene_engine_method_setting_and_metric(capsys, what):
     assert not missing, out
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_help_ends_with_an_example_that_the_parser_accepts(capsys, command):
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_ends_with_an_example_that_the_parser_accepts(capsys, name):
     """The last line of ``crosscheck COMMAND --help`` is a command line of this command."""
-    status, out, _ = run_main(capsys, command, "--help")
+    status, out, _ = run_main(capsys, name, "--help")
     example = out.rstrip().splitlines()[-1].strip()
-    assert status == 0 and "example:\n" in out and example.startswith(f"crosscheck {command}"), out
+    assert status == 0 and "example:\n" in out and example.startswith(f"crosscheck {name}"), out
     parser().parse_args(example.split()[1:])
 
 
@@ -275,8 +275,8 @@ def test_certify_refuses_an_output_file_in_a_missing_folder(capsys, tmp_path):
 
 
 def test_certify_writes_its_table_and_prints_the_progress_of_both_formulations(capsys, tmp_path):
-    """The table of 4 digits is asked for. The last progress is 100 of 100 hundredths of the motion, which
-    ends at 0.002 s."""
+    """CERTIFY asks for a table of 4 digits of the motion up to 0.002 s. Progress is printed in hundredths of
+    the motion; the last line of each formulation has 100 of 100."""
     pytest.importorskip("flint", reason="python-flint is the extra `certify`")
     status, _, err = run_main(capsys, *CERTIFY, str(tmp_path / "table.json"))
     assert status == 0 and json.loads((tmp_path / "table.json").read_text())["digits"] == 4, err
@@ -294,7 +294,7 @@ def test_option_with_one_setting_runs_it_once_without_a_sweep(capsys, still):
 
 
 def test_printed_command_of_a_record_repeats_its_run(capsys, still):
-    """Two records with other samples, options and outcomes; 1/3 needs all digits of a double."""
+    """Two records have other samples, options and outcomes; 1/3 needs all digits of a double."""
     scene = Scene.from_file(still).with_(duration=0.3)
     asked = [
         (np.linspace(0, 0.3, 4), {"seconds": 1 / 3}),
@@ -313,7 +313,7 @@ def test_printed_command_of_a_record_repeats_its_run(capsys, still):
 
 
 def test_an_engine_whose_settings_raise_is_left_out_with_its_error(capsys, still):
-    """Its method ``settings`` raises a ValueError; the other engine's three settings are run."""
+    """The method ``settings`` of NO_SETTINGS raises a ValueError; FAKE's three settings are run."""
     asked = ("--engine", FAKE, "--engine", f"{FAKES}:NO_SETTINGS", "--json")
     status, out, err = run_main(capsys, "run", still, *asked)
     assert status == 0 and "its settings are unknown: ValueError: no table of steps" in err, err
@@ -321,7 +321,7 @@ def test_an_engine_whose_settings_raise_is_left_out_with_its_error(capsys, still
 
 
 def test_settings_finer_than_one_that_timed_out_are_not_started(tmp_path):
-    """Runs that sleep for 0, 30 and 40 s, with a limit of 0.5 s; the engine logs each run."""
+    """Runs sleep for 0, 30 and 40 s, with a limit of 0.5 s. RECORDER writes a line for each run it begins."""
     scene = Scene(name=str(tmp_path / "log"), body=Scene.from_file(saved(tmp_path, "s")).body)
     settings = [grid.Setting("a", {"sleep": s}) for s in (0.0, 30.0, 40.0)]
     times = np.array([0.0, 1.0])
@@ -332,7 +332,7 @@ def test_settings_finer_than_one_that_timed_out_are_not_started(tmp_path):
 
 
 def test_json_of_tune_has_the_cheapest_setting_of_every_family_and_its_command(capsys, still):
-    """The fake needs 0.1 and 0.2 s in its family `plain` and 0.5 s in `noisy`, always without an error."""
+    """FAKE says that it takes 0.1 and 0.2 s in its family `plain` and 0.5 s in `noisy`; its error is zero."""
     status, out, err = run_main(capsys, "tune", FAKE, still, "--error", "1e-6", "--json")
     document = json.loads(out)
     assert status == 0, err
@@ -341,7 +341,7 @@ def test_json_of_tune_has_the_cheapest_setting_of_every_family_and_its_command(c
 
 
 def test_tune_has_exit_status_one_if_no_setting_reaches_the_error(capsys, still):
-    """The engine ELSEWHERE puts every body 1 mm off."""
+    """The engine ELSEWHERE puts every body 1 mm off; the error that is asked for by default is 1e-6."""
     status, out, err = run_main(capsys, "tune", f"{FAKES}:ELSEWHERE", still)
     assert status == 1 and "No setting reaches an error of 1e-06" in out, (out, err)
 
@@ -377,23 +377,25 @@ def test_version_lists_crosscheck_and_installed_engines(capsys):
     assert status == 0 and out.startswith("crosscheck ") and "\nmujoco " in out, out
 
 
-def test_compare_gives_the_median_of_five_timings_of_each_run(capsys, still):
-    """Every run of the fake says that it took the seconds of its setting."""
-    status, out, err = run_main(capsys, "compare", still, "--engine", FAKE, "--depth", "whole", "--json")
-    records = json.loads(out)["records"]
-    costs = [(r["cost"]["seconds"], r["timing"]["median"], r["timing"]["repeats"]) for r in records]
+def test_compare_gives_the_least_and_the_median_of_five_timings_of_each_run(capsys, still):
+    """VARYING says that successive runs take 2, 0.4, 1, 4 and 0.7 times the seconds of their setting. Three
+    settings are run by turns, so that each has all five factors: the least is 0.4 and the median 1."""
+    asked = ("--engine", f"{FAKES}:VARYING", "--depth", "whole", "--json")
+    status, out, err = run_main(capsys, "compare", still, *asked)
     assert status == 0, err
-    assert costs == [(0.1, 0.1, 5), (0.2, 0.2, 5), (0.5, 0.5, 5)], costs
+    for record, seconds in zip(json.loads(out)["records"], (0.1, 0.2, 0.5), strict=True):
+        assert record["cost"]["seconds"] == pytest.approx(0.4 * seconds), record
+        assert record["timing"] == {"median": seconds, "repeats": 5}, record
 
 
 def test_compare_prints_a_verdict_ratios_of_times_and_the_command_of_the_cheapest_run(capsys, still):
-    """The settings take 0.1, 0.2 and 0.5 s: ratios are 1, 2 and 5. The verdict has three questions."""
+    """FAKE says that settings take 0.1, 0.2 and 0.5 s: ratios 1, 2 and 5. The verdict has three answers."""
     status, out, _ = run_main(capsys, "compare", still, "--engine", FAKE)
     verdict = ("Who is right: fake agrees with the truth", "How fast: fake reaches", "Where each breaks: ")
     table = ("time (s)    ratio", "1.00e-01      1.0", "2.00e-01      2.0", "5.00e-01      5.0", "fake plain")
-    command = f"crosscheck run {still} --engine {FAKE} --setting plain --option seconds=0.1"
+    cheapest = f"crosscheck run {still} --engine {FAKE} --setting plain --option seconds=0.1"
     assert status == 0
-    for words in (*verdict, *table, "known in closed form", command):
+    for words in (*verdict, *table, "known in closed form", cheapest):
         assert words in out, (words, out)
 
 
@@ -430,7 +432,7 @@ def test_compare_gives_no_ratios_of_times_if_engines_differ_without_a_truth(caps
 
 
 def test_compare_does_not_judge_an_adapter_that_loses_a_spring(capsys, tmp_path):
-    """The torsion spring is slack at the start, so that only later accelerations differ."""
+    """LOSES_LOADS is Pinocchio without loads. The spring, slack at first, changes later accelerations."""
     later = TorsionSpring(joint="A", stiffness=30.0, damping=0.0, natural_angle=0.0)
     pendulum((0.5, 0.0, 0.0), load=(later,), duration=0.5).save(tmp_path / "later.toml")
     asked = ("--engine", "pinocchio", "--engine", f"{FAKES}:LOSES_LOADS", "--setting", "tuned")
@@ -442,8 +444,8 @@ def test_compare_does_not_judge_an_adapter_that_loses_a_spring(capsys, tmp_path)
 
 
 def test_compare_tries_every_family_before_it_says_that_an_engine_completes_no_run(capsys, still):
-    """The fourth of the engine's four families completes, the others fail. With the first family alone no run
-    completes."""
+    """Of the four families of the engine LAST_ONE_RUNS only the fourth completes its run. With the first
+    family alone no run completes."""
     status, out, _ = run_main(capsys, "compare", still, "--engine", f"{FAKES}:LAST_ONE_RUNS")
     assert status == 0 and "last is right at its best settings" in out and "fourth" in out, out
     asked = ("--engine", f"{FAKES}:LAST_ONE_RUNS", "--setting", "first")

@@ -23,8 +23,8 @@ def test_every_mechanism_of_the_table_is_found_by_its_name_and_has_a_truth(colum
 
 
 def test_column_turned_has_the_four_bar_rotated_by_seven_tenths_of_a_radian() -> None:
-    """The least-squares rotation (Kabsch) of its anchors and axes maps all of them, and has that angle. All
-    of this holds to rounding."""
+    """The least-squares rotation (Kabsch) of the anchors and axes of "four-bar" maps all of them onto the
+    column "turned", to rounding, and has the angle 0.7 rad of the column's description."""
     by_heading = {column.heading: column.make() for column in DIFFICULTIES}
     plain, turned = (
         np.array([[joint.anchor, joint.axis] for joint in by_heading[name].joint]).reshape(-1, 3)
@@ -58,7 +58,8 @@ def test_cell_shows_the_grade_and_the_error_of_a_run(record, text) -> None:
 
 
 def test_cell_has_the_run_of_least_error_and_the_run_of_the_defaults() -> None:
-    """The runs are of the first mechanism; the mechanism "Bennett" has no runs."""
+    """Of four runs of the first mechanism, the second has the least error, and the first is of the family
+    "defaults". The mechanism "Bennett" has no runs."""
     crashed = measured(None, "other", outcome="CRASHED")
     found = [measured(1e-3, "defaults"), measured(1e-9), measured(1e-5, "euler"), crashed]
     cell = matrix(found)["mujoco"][FIRST.heading]
@@ -81,11 +82,13 @@ def test_command_that_repeats_a_run_names_mechanism_engine_and_setting() -> None
 
 
 def test_sentence_on_a_refusal_names_its_reason_and_no_command_repeats_it() -> None:
-    """The engine lacks hinges; its only record is the best and the default one, and of no family."""
+    """The cell's only record is the refusal by an engine that lacks hinges. It stands for the best run and
+    for the defaults; it has no family and no command."""
     cell = matrix([refused()])["mujoco"][FIRST.heading]
-    assert cell.best() is cell.defaults() is cell.records[0]
-    assert sentence(cell.records[0]) == "refused: no hinge (missing in the engine)"
-    assert rerun(cell.records[0]) == "" and not cell.families()
+    [refusal] = cell.records
+    assert cell.best() is refusal and cell.defaults() is refusal and not cell.families()
+    assert sentence(refusal) == "refused: no hinge (missing in the engine)"
+    assert rerun(refusal) == ""
 
 
 def test_runs_whose_loops_crosscheck_closes_have_a_row_of_their_own() -> None:
@@ -98,11 +101,14 @@ def test_runs_whose_loops_crosscheck_closes_have_a_row_of_their_own() -> None:
     assert rows["drake, terms"]["four-bar"].best() is by_crosscheck
 
 
-def test_a_record_supersedes_its_run_older_versions_and_refusals_of_engine_and_mechanism() -> None:
-    """Records of another family of the version, and of another mechanism, remain."""
+def test_new_record_replaces_its_run_an_older_version_or_a_refusal() -> None:
+    """The new record is a run by MuJoCo 4.0.0 on the first mechanism, or MuJoCo's refusal of it. A table has
+    one version of an engine, and either runs or a refusal for a mechanism."""
     new = measured(1e-9)
-    assert records.supersedes(new, measured(1e-9)), "the same key"
-    assert not records.supersedes(new, measured(1e-3, "defaults"))
-    assert records.supersedes(new, measured(1e-3, "defaults", version="3.0.0")), "an older version"
-    assert records.supersedes(new, refused()) and records.supersedes(refused(), new)
-    assert not records.supersedes(new, measured(1e-3, scene="bennett", version="3.0.0"))
+    replaced = {"same run": measured(1e-9), "refusal": refused()}
+    replaced |= {"older version": measured(1e-3, "defaults", version="3.0.0")}
+    kept = {"other family": measured(1e-3, "defaults")}
+    kept |= {"other mechanism": measured(1e-3, scene="bennett", version="3.0.0")}
+    assert [name for name, old in replaced.items() if not records.supersedes(new, old)] == []
+    assert [name for name, old in kept.items() if records.supersedes(new, old)] == []
+    assert records.supersedes(refused(), new)

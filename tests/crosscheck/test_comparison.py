@@ -34,7 +34,7 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
 
 
 def test_a_comparison_in_python_equals_the_json_of_the_command(compared, tmp_path, capsys):
-    """Their fields, the headline, and settings and metrics of all runs; times differ from run to run."""
+    """Fields, headline, and settings and metrics of all runs are equal; times differ from run to run."""
     BLOCK.save(tmp_path / "block.toml")
     asked = ("compare", str(tmp_path / "block.toml"), "--engine", FAKE, "--samples", "3", "--json")
     assert main(asked) == 0
@@ -55,12 +55,12 @@ def test_text_of_a_comparison_has_its_headline_in_eighty_columns(compared):
 
 
 def test_rows_and_data_frame_of_a_comparison_have_one_row_a_run(compared):
-    """The fake has three settings, and a body at rest has no error."""
+    """FAKE has three settings, and the block, at rest without forces, has no error."""
     rows, frame = compared.rows, compared.to_dataframe()
     assert [row["verdict"] for row in rows] == ["right"] * 3 and frame.shape[0] == 3
     settings = sorted((row["family"], row["settings"]["seconds"]) for row in rows)
     assert settings == [("noisy", 0.5), ("plain", 0.1), ("plain", 0.2)]
-    assert list(frame["error"]) == [row["error"] for row in rows] == [0.0] * 3
+    assert [row["error"] for row in rows] == [0.0] * 3 and list(frame["error"]) == [0.0] * 3
 
 
 def test_a_comparison_refuses_an_unknown_depth_or_engine():
@@ -72,8 +72,8 @@ def test_a_comparison_refuses_an_unknown_depth_or_engine():
 
 
 def test_runs_of_one_engine_follow_each_other_and_do_not_wait_for_their_measurement():
-    """Two engines with three runs each of 20 ms or more, so that runs that overlap are seen; ``measure``
-    returns only after all six runs have ended."""
+    """Two engines have three runs each, of 20 ms, so that overlapping runs of an engine would be seen. Each
+    measurement waits until all six runs have ended: it would wait for ever if a run waited for one."""
     cases = [
         Case(BLOCK, np.array([0.0, 1.0]), name, Setting("f", {"k": k}))
         for k in range(3)
@@ -103,7 +103,7 @@ def test_runs_of_one_engine_follow_each_other_and_do_not_wait_for_their_measurem
 
 
 def test_an_exception_in_a_run_is_raised_by_the_study():
-    """The executor of comparisons runs the only case, whose function raises OSError."""
+    """The study has one case, which the executor of comparisons (``Chains``) runs."""
 
     def run(asked):
         raise OSError("no disk")
@@ -125,8 +125,8 @@ def test_a_comparison_is_saved_as_json_only(compared, tmp_path):
 
 
 def test_a_quick_comparison_runs_mbref_at_its_default_method():
-    """The Taylor series is the default of small mechanisms. It is among the few families of quick depth, and
-    is the first of the engine's best settings."""
+    """mbref's default for small mechanisms is the method taylor. It is among the few families of a quick
+    comparison, and the first of the engine's best settings."""
     scene = SCENES["four_bar_gravity"]()
     families = {case.setting.family for case in of_few_families(default_cases(scene, ["mbref"])[0])}
     assert "taylor" in families and engine("mbref").best_settings(scene)[0].family == "taylor"

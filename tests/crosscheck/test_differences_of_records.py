@@ -1,4 +1,5 @@
-"""Differences of two sets of records: sentences on numbers just below and just above the limits of noise."""
+"""Differences of two sets of records are reported in sentences. Numbers just above a limit of noise differ,
+numbers just below do not."""
 
 import json
 from typing import Any
@@ -29,16 +30,18 @@ def said(old: dict[str, Any], new: dict[str, Any]) -> list[str]:
 
 @pytest.mark.parametrize(("first", "second"), [(2e-9, 1e-12), (1e-12, 2e-9)])
 def test_errors_below_the_larger_bound_of_both_truths_do_not_differ(first, second):
-    """1e-10 and 9e-10 differ only if the truths of both sets are known better than that."""
+    """Errors of 1e-10 and 9e-10 differ only if the truths of both sets are known better: a bound of 2e-9 in
+    one of them hides the difference, bounds of 1e-12 do not."""
     assert said(one(1e-10, bound=first), one(9e-10, bound=second)) == []
     assert said(one(1e-10, bound=1e-12), one(9e-10, bound=1e-12)) == ["error 1.00e-10 → 9.00e-10"]
 
 
 def test_times_that_differ_by_three_quarters_are_reported_only_if_both_runs_were_repeated():
-    """A single time may be that much longer by chance: 1 s and 1.75 s."""
+    """Times are 1 s and 1.75 s. A single run may take that much longer by chance."""
     fast, slow = one(1e-5, repeated=True), one(1e-5, seconds=1.75, repeated=True)
     assert said(fast, slow) == ["time 1.00e+00 s → 1.75e+00 s"]
-    assert said(fast, one(1e-5, seconds=1.75)) == said(one(1e-5, seconds=1.75), fast) == []
+    single = one(1e-5, seconds=1.75)
+    assert said(fast, single) == [] and said(single, fast) == []
 
 
 NAMES = {"velocity_error": "velocities", "violation_position": "closure"}
@@ -56,7 +59,7 @@ def test_other_errors_of_a_run_are_compared_if_the_positions_agree(metric, name)
 
 
 def stored(place, *lines: dict[str, Any], **timings: float):
-    """A folder with records, and with the times of interleaved runs by key."""
+    """Write records, and times (s) of interleaved runs by key of record, into a folder; return the folder."""
     asked = {"engine": "a", "options": {"step": 0.1}, "samples": 3, "end": 1.0}
     common = {"scene": "s", "family": "f", "asked": asked, "version": "1", "outcome": "COMPLETED"}
     common |= {"message": "", "t_end": 1.0, "time_limit": 60.0, "metrics": {}, "versions": {}, "settings": {}}
@@ -70,7 +73,7 @@ def stored(place, *lines: dict[str, Any], **timings: float):
 
 
 def test_interleaved_times_of_a_folder_replace_those_of_its_records(tmp_path):
-    """The run k2 has an interleaved time of 0.5 s, k1 has none."""
+    """Both records have a cost of 4 s. The run k2 has an interleaved time of 0.5 s, k1 has none."""
     place = stored(tmp_path, {"key": "k1"}, {"key": "k2", "family": "g"}, k2=0.5)
     found = {record["key"]: record for record in load(place).values()}
     assert [(found[k]["cost"], found[k]["repeated"]) for k in ("k1", "k2")] == [
@@ -97,7 +100,8 @@ def test_a_missing_file_or_field_of_records_is_refused(tmp_path):
 
 
 def test_records_of_another_version_of_a_scene_are_left_out(tmp_path):
-    """The folder's scene decides which version counts; without it, the last record does."""
+    """The records k1 and k2 are of a scene and of one with another mass. The folder's file of the scene
+    decides which records count; without a file the last record does."""
     scene = Scene(name="s", body=(Body(name="b", mass=1.0, inertia=(1.0,) * 3, position=(0.0,) * 3),))
     heavier = scene.with_(body=(scene.body[0].model_copy(update={"mass": 2.0}),))
     place = stored(
@@ -110,7 +114,7 @@ def test_records_of_another_version_of_a_scene_are_left_out(tmp_path):
 
 
 def test_a_faulty_scene_of_a_folder_of_records_is_refused(tmp_path):
-    """Its gravity is one number; the error names the scene's file in the folder."""
+    """The scene's gravity is one number instead of three; the error names the scene's file."""
     place = stored(tmp_path, {"key": "k1"})
     (place / "scenes").mkdir()
     (place / "scenes" / "s.toml").write_text("gravity = 3\n")
@@ -119,7 +123,8 @@ def test_a_faulty_scene_of_a_folder_of_records_is_refused(tmp_path):
 
 
 def test_runs_of_different_mechanisms_are_listed_without_comparison():
-    """Records name their mechanism; one without a name is compared."""
+    """A record of mechanism m1 and one of m2 are listed as "only in" their sets. Records of one mechanism, or
+    one that names none, are compared: one change."""
     old, new = one(1e-5), one(1e-4)
     old["run"]["mechanism"], new["run"]["mechanism"] = "m1", "m2"
     first, second = changes(old, new)
@@ -152,8 +157,9 @@ def circumstance(engine: str, version: str, cpu: str, **more: Any) -> dict[str, 
 
 
 def test_comparison_of_records_names_changed_versions_machines_and_mechanisms():
-    """``circumstance`` is a record of scene s by an engine, its version and a processor. The first engine has
-    two versions before and one after; run 1 moves to another processor and run 2 to another mechanism."""
+    """``circumstance`` is a record of scene s by an engine, its version and a processor. Engine a has
+    versions 1.0 and 1.1 before and 1.0 after, engine b none and 2. Run 1 is repeated on another processor;
+    run 2 too, but of another mechanism, so that its time is not counted."""
     old = {
         "1": circumstance("a", "1.0", "x", commit="c1"),
         "2": circumstance("a", "1.1", "x", mechanism="m1"),

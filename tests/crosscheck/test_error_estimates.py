@@ -21,7 +21,7 @@ LOOSE = Setting("mpi-svd+projection", {"rtol": 1e-4})
 
 
 def test_error_that_mbref_estimates_equals_the_error_against_the_truth():
-    """By the judge's truth, within 0.1 %: mbref compares runs at tolerances of 1e-4 and much less."""
+    """mbref compares runs at tolerances of 1e-4 and much less; the judge's error is equal within 0.1 %."""
     record = run_case(Case(SCENE, TIMES, "mbref", LOOSE))
     found = record["error_estimate"]
     assert found["largest"] == max(found["error"]) and len(found["error"]) == len(TIMES)
@@ -30,7 +30,7 @@ def test_error_that_mbref_estimates_equals_the_error_against_the_truth():
 
 
 def test_an_estimate_that_needs_more_than_its_time_is_left_out_and_the_run_is_unchanged():
-    """The limit is 0 s. The run has the positions of a run without estimate."""
+    """The limit of the estimate's time is 0 s. The positions are those of a run without estimate."""
     run = serve.run_estimated("mbref", SCENE, TIMES, LOOSE, 0.0)
     found = run.to_record()["error_estimate"]
     assert found["largest"] is None and "more than 0 s" in found["reason"]
@@ -38,7 +38,7 @@ def test_an_estimate_that_needs_more_than_its_time_is_left_out_and_the_run_is_un
 
 
 def test_an_engine_without_estimates_has_none_in_its_record():
-    """The engine FAKE has no estimate of its own: its run stays as it is."""
+    """FAKE is an engine that estimates no errors: ``with_error_estimate`` returns its run as it is."""
     record = run_case(Case(SCENE, TIMES, f"{FAKES}:FAKE", Setting("a", {"seconds": 0.5})))
     assert "error_estimate" not in record
     run = Fake().run(SCENE, TIMES, Setting("a", {"seconds": 0.5}))
@@ -46,7 +46,7 @@ def test_an_engine_without_estimates_has_none_in_its_record():
 
 
 def test_the_message_of_an_estimated_run_says_that_its_motion_is_sensitive():
-    """Three rods in a row, released from a horizontal line, are chaotic."""
+    """Three rods in a row, released from a horizontal line, move chaotically."""
     names, pins = ("ground", "a", "b", "c"), [(0.4 * k, 0.0, 0.0) for k in range(4)]
     bodies = [rod(names[k + 1], pins[k], pins[k + 1]) for k in range(3)]
     joints = [hinge(f"P{k}", names[k], names[k + 1], pins[k]) for k in range(3)]

@@ -1,4 +1,4 @@
-"""What crosscheck exports, and the engine of the examples as an installed plug-in."""
+"""The engine of examples/tiny_engine as an installed plug-in, and the names that crosscheck exports."""
 
 import ast
 import re
@@ -41,7 +41,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_list_names_an_installed_plug_in_with_its_version(installed, capsys):
-    """The table of ``crosscheck list engines`` has engine, package and version of the example's project."""
+    """``crosscheck list engines`` prints engine, package and version of the example's pyproject.toml."""
     assert "tiny" in engine_names(), engine_names()
     assert main(["list", "engines"]) == 0
     out = capsys.readouterr().out
@@ -49,8 +49,8 @@ def test_list_names_an_installed_plug_in_with_its_version(installed, capsys):
 
 
 def test_plug_in_simulates_the_scene_and_gives_its_true_motion(installed):
-    """``model_difference`` compares a short run with the truth, as `compare` does before its runs. An error
-    up to 1e-8 of the length is right."""
+    """``model_difference`` compares a short run with the truth, as ``crosscheck compare`` does before its
+    runs, and finds none. A longer run has an error below 1e-8 of the length or rad, the limit of "right"."""
     scene = SCENES["planar_slider_crank"]().with_(duration=0.1)
     cases = identity_cases(scene, ["tiny"], 60.0)
     found = model_difference(scene, [run_case(case) for case in cases])
@@ -63,8 +63,8 @@ def test_plug_in_simulates_the_scene_and_gives_its_true_motion(installed):
 
 
 def test_short_runs_that_compare_models_compile_no_code():
-    """Before a comparison each engine runs the scene briefly, by a family that needs no compilation: families
-    that compile code have names that end in "compiled" or "generated"."""
+    """Before a comparison each engine runs the scene briefly, by one family. Names of families that compile
+    code end in "compiled" or "generated"; those that are chosen compile none."""
     found = identity_cases(SCENES["four_bar_gravity"](), ["mbref", "mujoco", "pinocchio"], 60.0)
     assert [case.setting.family for case in found] == ["taylor", "tuned", "tuned"]
 
@@ -79,12 +79,12 @@ def test_verify_passes_the_tiny_plug_in_and_lists_the_spatial_scene_that_it_refu
 
 @pytest.mark.parametrize("name", crosscheck.__all__)
 def test_every_exported_name_exists_and_is_listed(name: str) -> None:
-    """Names of ``crosscheck.__all__`` are imported at their first use; ``dir`` lists them before."""
+    """Names of ``crosscheck.__all__`` are imported at their first use; ``dir`` lists them."""
     assert getattr(crosscheck, name) is not None and name in dir(crosscheck)
 
 
 def test_crosscheck_exports_functions_beside_its_modules_engine_and_study() -> None:
-    """`find_engine` and `run_study` are exported under other names than their modules."""
+    """The functions `engine` and `study` are exported under other names than their modules."""
     assert crosscheck.find_engine("mbref").name == "mbref"
     assert crosscheck.run_study is crosscheck.study.study
 
@@ -97,7 +97,7 @@ def test_importing_crosscheck_imports_neither_numpy_nor_numba_nor_mbref() -> Non
 
 
 def test_an_engine_in_the_working_directory_is_found(tmp_path, monkeypatch) -> None:
-    """The path of modules has no entry "" for the working directory, as in an installed program."""
+    """Python's path of modules has no entry "" for this directory, as in an installed program."""
     (tmp_path / "beside_me.py").write_text("from crosscheck.engines.mbref import ENGINE\n")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [path for path in sys.path if path])

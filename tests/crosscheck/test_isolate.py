@@ -56,7 +56,8 @@ def run(fake: str, scene: Scene | None = None, time_limit: float = 60.0) -> Traj
     ],
 )
 def test_a_failed_engine_gives_a_crashed_trajectory_with_the_cause(fake: str, message: str, version: str):
-    """It has the setting and no samples, in a shared process and in one of its own (``observe``)."""
+    """The engines end their process, raise, quit, or miss a package. The trajectory has the setting and no
+    samples, whether the run has a process of its own (``observe``) or shares one."""
     ended = run(fake)
     assert (ended.outcome, ended.message, ended.version) == (Outcome.CRASHED, message, version)
     assert (ended.method, ended.settings) == (PLAIN.family, PLAIN.options)
@@ -66,8 +67,8 @@ def test_a_failed_engine_gives_a_crashed_trajectory_with_the_cause(fake: str, me
 
 
 def test_the_time_that_an_engine_needs_to_compile_extends_the_limit_of_a_run():
-    """The engine computes for 0.4 s, with a limit of 0.1 s and up to 10 s of compilation. Both a child
-    process and this process extend the limit; without compilation the run times out."""
+    """The engine computes for 0.4 s at a limit of 0.1 s. A run in a child and one in this process complete if
+    it says that it compiles for up to 10 s, and time out if not."""
     runner = InProcess(CompilingModels(), time_limit=0.1)
     for ended in (run("COMPILING_MODELS", time_limit=0.1), runner.observe(still(), TIMES, PLAIN).value):
         assert ended.outcome is Outcome.COMPLETED, ended.message
@@ -77,7 +78,8 @@ def test_the_time_that_an_engine_needs_to_compile_extends_the_limit_of_a_run():
 
 
 def test_every_observed_run_has_a_process_of_its_own_that_ends(tmp_path: Path):
-    """The engine HERALD prints a banner when a process prepares it first."""
+    """The engine HERALD prints a banner when a process prepares it for the first time, and logs the process
+    of each run: three runs have three banners and three processes, which end."""
     log = tmp_path / "log"
     seen = [observe(f"{FAKES}:HERALD", still(str(log)), TIMES, PLAIN, 60.0) for _ in range(3)]
     assert [one.printed for one in seen] == ["a banner\n"] * 3, seen
@@ -95,7 +97,7 @@ def test_an_observed_run_that_hangs_is_killed_with_the_processes_that_it_started
 
 
 def test_output_and_files_of_an_engine_do_not_reach_the_parent_process(capfd, tmp_path, monkeypatch):
-    """The engine CHATTER prints and writes a file into its working folder."""
+    """CHATTER prints and writes a file into its working folder."""
     monkeypatch.chdir(tmp_path)
     ended = run("CHATTER")
     assert ended.outcome is Outcome.COMPLETED, ended.message
@@ -104,17 +106,16 @@ def test_output_and_files_of_an_engine_do_not_reach_the_parent_process(capfd, tm
 
 
 def test_a_child_computes_with_one_thread(monkeypatch: pytest.MonkeyPatch):
-    """The engine THREADS gives the numbers of threads of its process as its version."""
+    """Two threads are asked for. THREADS gives OpenBLAS' and OpenMP's numbers as its version."""
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
-    ended = run("THREADS")
-    assert ended.version == "11", f"OPENBLAS and OMP threads, one digit each: {ended.version}"
+    assert run("THREADS").version == "11"
 
 
 def test_runs_of_an_engine_share_a_process_until_one_does_not_complete(tmp_path: Path):
-    """The engine logs the process of every run; the last number says which process is expected."""
+    """RECORDER logs the process of every run. A run that does not complete is its process's last."""
     log = tmp_path / "log"
-    runs = [
+    runs = [  # options, outcome, number of the process
         ({}, "COMPLETED", 0),
         ({}, "COMPLETED", 0),
         ({"outcome": "NOT_CONVERGED"}, "NOT_CONVERGED", 0),
@@ -138,9 +139,10 @@ def numbered(log: Path) -> list[int]:
 
 
 def test_runs_in_turn_share_a_process_until_one_passes_its_limit(tmp_path: Path):
-    """An engine that ends a run early by itself serves on; one that sleeps past its limit is ended."""
+    """The engine RECORDER logs the process of every run. A process in which a run did not converge serves the
+    next run; one whose run sleeps past its limit is ended."""
     log = tmp_path / "log"
-    runs = [
+    runs = [  # options, limit (s), outcome
         ({}, 60.0, "COMPLETED"),
         ({"outcome": "NOT_CONVERGED"}, 60.0, "NOT_CONVERGED"),
         ({}, 60.0, "COMPLETED"),
@@ -154,7 +156,8 @@ def test_runs_in_turn_share_a_process_until_one_passes_its_limit(tmp_path: Path)
 
 
 def test_preparation_of_an_engine_after_a_time_out_does_not_count_against_the_next_limit(tmp_path: Path):
-    """The engine SLOW prepares for 2 s in every new process; its runs may take 1.5 s."""
+    """The engine SLOW prepares for 2 s in every new process, and its runs may take 1.5 s. The third run has a
+    new process, since the second one timed out, and completes."""
     log, limit = tmp_path / "log", 1.5
     for options, outcome in (({}, "COMPLETED"), ({"sleep": 60.0}, "TIMED_OUT"), ({}, "COMPLETED")):
         ended = run_isolated(f"{FAKES}:SLOW", still(str(log)), TIMES, Setting("a", options), limit)
@@ -170,19 +173,21 @@ def test_an_engine_that_hangs_in_its_preparation_times_out(monkeypatch: pytest.M
 
 
 def test_the_last_line_that_an_engine_prints_in_its_preparation_is_known_meanwhile():
-    """`starting` gives it for each engine that is being prepared, and nothing afterwards."""
+    """`starting` has the last printed line of each engine that is being prepared, and is empty afterwards.
+    The engine COMPILING prints "compiling kernels"; the line that its run starts may be seen at last."""
     with ThreadPoolExecutor(1) as thread:
         made = thread.submit(run_in_turn, f"{FAKES}:COMPILING", still(), TIMES, PLAIN, 60.0)
         seen = set()
         while not made.done():
             seen |= set(starting().values())
         assert made.result().outcome is Outcome.COMPLETED, made.result().message
-    assert {"compiling kernels", f"{FAKES}:COMPILING plain starts"} >= seen >= {"compiling kernels"}
+    assert seen - {f"{FAKES}:COMPILING plain starts"} == {"compiling kernels"}
     assert not starting()
 
 
 def test_first_questions_to_an_engine_wait_for_each_other(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
-    """Two threads ask for its settings, for which it compiles; it logs the begin and end of each answer."""
+    """Two threads ask the engine SEARCHING for its settings. It logs when it begins and ends to look for
+    them: the second one begins after the first one has ended."""
     log = tmp_path / "log"
     monkeypatch.setenv("FAKE_LOG", str(log))
     with ThreadPoolExecutor(2) as threads:
@@ -209,24 +214,25 @@ REAL = {  # settings of two families each
 
 @pytest.mark.parametrize("name", REAL)
 def test_an_engines_run_does_not_depend_on_earlier_runs_in_its_process(name: str):
-    """Two scenes at two settings in turn, in one process and in processes of their own: equal to the bit."""
+    """Two jobs, each a scene and a setting, run in processes of their own, and then as first, second, first
+    in one process. Their records are equal to the bit."""
     times = np.linspace(0.0, 0.01, 5)
     scenes = SCENES["five_bar"](), SCENES["spatial_slider_crank_driven"]()
     first, second = jobs = list(zip(scenes, REAL[name], strict=True))
     alone = [observe(name, scene, times, setting, 60.0).value for scene, setting in jobs]
     shared = [run_isolated(name, scene, times, setting, 60.0) for scene, setting in (first, second, first)]
-    assert all(run.outcome is Outcome.COMPLETED for run in shared), shared
+    assert all(each.outcome is Outcome.COMPLETED for each in shared), shared
     assert list(map(untimed, shared)) == [untimed(alone[0]), untimed(alone[1]), untimed(alone[0])]
 
 
-def untimed(run: Trajectory) -> str:
-    """The record of a run without the seconds it took, in bits (NaN equal to NaN)."""
-    record = run.to_record()
+def untimed(ended: Trajectory) -> str:
+    """Return the record of a run without the seconds that it took, as text, in which NaN equals NaN."""
+    record = ended.to_record()
     return repr({**record, "cost": {k: v for k, v in record["cost"].items() if "seconds" not in k}})
 
 
 def test_stop_all_kills_a_running_child_and_its_run_is_crashed(tmp_path: Path):
-    """The engine HANG writes the number of its process and sleeps."""
+    """The engine HANG writes a number into a file when it runs, and sleeps; then ``stop_all`` is called."""
     pid = tmp_path / "pid"
     with ThreadPoolExecutor(1) as pool:
         future = pool.submit(run, "HANG", still(str(pid)))
@@ -239,8 +245,9 @@ def test_stop_all_kills_a_running_child_and_its_run_is_crashed(tmp_path: Path):
 
 
 def test_interleaved_runs_take_turns_in_one_process_after_one_untimed_round(tmp_path: Path):
-    """Job a says that it takes 0.5 s; job b does not complete and has no time. Each is run once untimed and
-    twice timed. The process that has imported the first job's engine serves this and the next timing."""
+    """The engine RECORDER logs family and process of each run: a and b by turns, once untimed and twice
+    timed. Job a says that it takes 0.5 s; job b does not complete, and has no time. All runs are in the
+    process that had the engine before, and so are those of the next timing."""
     log = tmp_path / "log"
     _, served = ask(f"{FAKES}:RECORDER", converse, (), 60.0)
     jobs = [
@@ -252,13 +259,13 @@ def test_interleaved_runs_take_turns_in_one_process_after_one_untimed_round(tmp_
     assert len(seconds[1]) == 2 and all(map(math.isnan, seconds[1])), seconds
     order, processes = zip(*(line.split() for line in log.read_text().splitlines()), strict=True)
     assert order == ("a", "b") * 3, order
-    assert {int(process) for process in processes} == {served} != {os.getpid()}
+    assert {int(process) for process in processes} == {served} and served != os.getpid()
     time_interleaved(still(str(log)), TIMES, jobs, repeats=1, time_limit=60.0)
     assert set(numbered(log)) == {0}
 
 
 def test_setting_a_hundred_times_behind_the_fastest_is_timed_once(tmp_path: Path):
-    """0.5 s is 500 times 0.001 s, and 0.09 s is 90 times."""
+    """Of three repeats: 0.5 s is 500 times the fastest's 0.001 s, and 0.09 s is 90 times."""
     jobs = [
         (f"{FAKES}:RECORDER", Setting(name, {"seconds": seconds}))
         for name, seconds in (("slow", 0.5), ("fast", 0.001), ("near", 0.09))
@@ -268,7 +275,7 @@ def test_setting_a_hundred_times_behind_the_fastest_is_timed_once(tmp_path: Path
 
 
 def test_a_crash_among_interleaved_runs_is_raised_with_its_signal():
-    """The second of two engines touches memory that it does not own."""
+    """The second of two engines, SEGFAULT, ends its process by the signal SIGSEGV."""
     jobs = [(f"{FAKES}:FAKE", PLAIN), (f"{FAKES}:SEGFAULT", PLAIN)]
     with pytest.raises(ChildFailed, match="SIGSEGV") as caught:
         time_interleaved(still(), TIMES, jobs, repeats=1, time_limit=60.0)
@@ -276,7 +283,7 @@ def test_a_crash_among_interleaved_runs_is_raised_with_its_signal():
 
 
 def test_an_interrupt_ends_the_running_call_of_a_thread_and_cancels_the_waiting_one(tmp_path: Path):
-    """One thread has two calls of an engine that sleeps; KeyboardInterrupt comes while the first runs."""
+    """One thread has two calls of HANG, which sleeps; KeyboardInterrupt is raised while the first runs."""
     pid = tmp_path / "pid"
     with ThreadPoolExecutor(1) as pool:
         calls = [pool.submit(run, "HANG", still(str(pid))) for _ in range(2)]

@@ -1,6 +1,7 @@
-"""Engines that misbehave in every way `isolate` has to survive, and one that behaves."""
+"""Engines for tests: one that leaves every body at its start, and variants of it that fail or misbehave."""
 
 import ctypes
+import itertools
 import os
 import signal
 import subprocess
@@ -99,8 +100,8 @@ class Missing(Fake):
 
 
 class Recorder(Fake):
-    """Its runs leave their order and process in the file that the scene's name gives; the options may have
-    it sleep, raise or send itself a signal after that."""
+    """Its runs leave their order and process in the file that the scene's name gives; the options may have it
+    sleep, raise or send itself a signal after that."""
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         with open(scene.name, "a") as file:
@@ -172,6 +173,16 @@ class CompilingModels(Fake):
         computing(time.process_time() + 0.4)
 
 
+class Varying(Fake):
+    """Says that its runs take 2, 0.4, 1, 4, 0.7, 2, 0.4, … times the seconds of their settings."""
+
+    factors = itertools.cycle((2.0, 0.4, 1.0, 4.0, 0.7))
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        made = super().run(scene, times, setting)
+        return replace(made, cost=Cost(next(self.factors) * made.cost.seconds))
+
+
 class Searching(Fake):
     """Compiles for its settings: writes to the file FAKE_LOG when that begins and ends, and waits a while for
     a second process that does so."""
@@ -201,24 +212,24 @@ class Malformed(Fake):
 
 
 DAMAGES = {
-    "nothing": lambda good: None,
-    "a table": lambda good: good.to_record(),
-    "an engine": lambda good: Fake,
-    "no outcome": lambda good: replace(good, outcome="COMPLETED"),
+    "None": lambda good: None,
+    "a dictionary": lambda good: good.to_record(),
+    "a class": lambda good: Fake,
+    "outcome as text": lambda good: replace(good, outcome="COMPLETED"),
     "other bodies": lambda good: replace(good, bodies=("someone",)),
     "no bodies": lambda good: replace(good, bodies=None),
     "other times": lambda good: replace(good, times=good.times + 1e-3),
     "few samples": lambda good: replace(good, times=good.times[:1], position=good.position[:1]),
     "few positions": lambda good: replace(good, position=good.position[:1]),
     "wrong shape": lambda good: replace(good, position=good.position[:, 0]),
-    "text": lambda good: replace(good, velocity="fast"),
-    "ragged": lambda good: replace(good, velocity=[[1.0], [1.0, 2.0]]),
+    "velocity as text": lambda good: replace(good, velocity="fast"),
+    "ragged velocity": lambda good: replace(good, velocity=[[1.0], [1.0, 2.0]]),
     "no rotation": lambda good: replace(good, orientation=0 * good.orientation),
     "unknown joint": lambda good: replace(good, reactions={"X": np.zeros((3, 6))}),
-    "no cost": lambda good: replace(good, cost=1.0),
+    "cost as a number": lambda good: replace(good, cost=1.0),
     "negative cost": lambda good: replace(good, cost=Cost(seconds=-0.1)),
     "another scene": lambda good: replace(good, scene="moving"),
-    "no version": lambda good: replace(good, version=" "),
+    "blank version": lambda good: replace(good, version=" "),
     "cost of NaN": lambda good: replace(good, cost=Cost(seconds=float("nan"))),
     "settings of objects": lambda good: replace(good, settings={"a": Fake}),
     "a local class": lambda good: type("Local", (), {})(),
@@ -293,7 +304,7 @@ THREADS, MISSING, RECORDER, AGING = Threads(), Missing(), Recorder(), Aging()
 KEEPING, HERALD = Keeping(), Herald()
 SLOW, STUCK, COMPILING, SEARCHING = Slow(), Stuck(), Compiling(), Searching()
 NO_SETTINGS, REFUSING = NoSettings(), Refusing()
-MALFORMED, SCALARS, VERSIONLESS = Malformed(), Scalars(), Versionless()
+MALFORMED, SCALARS, VERSIONLESS, VARYING = Malformed(), Scalars(), Versionless(), Varying()
 COMPILING_MODELS = CompilingModels()
 LOSES_LOADS, LAST_ONE_RUNS, ELSEWHERE = LosesLoads(), LastOneRuns(), Elsewhere()
 
