@@ -39,7 +39,7 @@ WAYS = {  # engine and setting
     "casadi projected": ("casadi", Setting("projected, compiled", TERMS)),
     "heyoka taylor": ("heyoka", Setting("taylor", {"rtol": 1e-9})),
 }
-# these compile their code, for seconds or minutes
+# these compile code for seconds or minutes
 SLOW = ("newton lox", "mjx stock", "mjx single", "warp stock", "casadi projected", "heyoka taylor")
 DRIVEN = ("ondsel kinematics",)  # moves mechanisms whose whole motion is driven
 REFUSED = {("casadi projected", "rotated"), ("heyoka taylor", "rotated")}  # their loops are planar
@@ -49,7 +49,7 @@ FLOOR = 1e-8  # rounding over a run, and what remains of Newton's method
 
 
 def cut_at(first: int):
-    """The relation of a scene to one whose joints begin with another joint, so that another one is cut."""
+    """Return the change of a scene that puts joint ``first`` first, so that the loop is cut elsewhere."""
     return unchanged(
         "with joints in another order, the motion is unchanged",
         lambda scene: scene.with_(joint=(*scene.joint[first:], *scene.joint[:first])),
@@ -70,7 +70,7 @@ def four_bar(way: str = "") -> tuple[Scene, Trajectory]:
 
 
 def off(way: str, scene: Scene, expected: Trajectory) -> float:
-    """Return the largest error of an engine's run, relative to the scene's length or in rad."""
+    """Return the largest error of an engine's run from a motion, relative to the scene's length or in rad."""
     name, setting = WAYS[way]
     run = engine(name).run(scene, TIMES, setting)
     assert run.outcome is Outcome.COMPLETED, f"{way}: {run.outcome.label} {run.message}"
@@ -102,8 +102,9 @@ def changed_by(copy: str, way: str) -> tuple[Scene, Trajectory]:
     ],
 )
 def test_an_engine_moves_a_copy_within_four_times_its_error_on_the_original(way: str, copy: str) -> None:
-    """Errors are differences from the judge's motion of the four-bar, changed as the copy. On the original
-    they are below 1e-2 of the length or rad; 1e-8 is added for rounding."""
+    """The expected motion of a copy is the judge's motion of the four-bar, changed as the copy. An engine's
+    error on the copy may be four times (WORSE) its error on the original, plus 1e-8 (FLOOR). So that this
+    says something, the error on the original is below 1e-2 of the length or rad."""
     found = off(way, *changed_by(copy, way))
     assert own_error(way) < 1e-2
     assert found <= WORSE * own_error(way) + FLOOR, f"{copy}: {found:.1e}, original {own_error(way):.1e}"
@@ -111,8 +112,9 @@ def test_an_engine_moves_a_copy_within_four_times_its_error_on_the_original(way:
 
 @pytest.mark.parametrize(("way", "copy"), sorted(REFUSED))
 def test_engines_with_generated_code_refuse_a_loop_rotated_out_of_its_coordinate_plane(way: str, copy: str):
-    """A point closes the loop by three rows. In a coordinate plane one row is zero at every pose, and is left
-    out. Rotated, the three rows are not zero but depend on each other: planar motions have two directions."""
+    """These engines close the loop by a point, with three rows. In a coordinate plane one row is zero at
+    every pose, and is left out. In a rotated copy no row is zero, but they depend on each other, because the
+    plane has two directions: such scenes are refused."""
     refusal = engine(WAYS[way][0]).cannot(changed_by(copy, way)[0])
     assert refusal is not None and refusal.reason.endswith(" not derived: its closures depend on each other")
 
@@ -122,15 +124,16 @@ def test_engines_with_generated_code_refuse_a_loop_rotated_out_of_its_coordinate
     [("mujoco", "projected"), ("pinocchio", "tuned"), ("drake", "terms"), ("dart", "terms")],
 )
 def test_ball_joint_given_twice_changes_no_motion(name: str, family: str) -> None:
-    """Rows of the second joint are rounding in the coordinates of the engine's tree, and must not limit its
-    accelerations. At the finest settings both motions over 0.02 s differ by less than 1e-9 m or rad."""
+    """A copy of a ball joint constrains nothing more. In the engine's joint coordinates its rows are zero but
+    for rounding, and must not limit accelerations. At the finest setting the motions with and without the
+    copy differ over 0.02 s by less than 1e-9 m or rad."""
     if not installed(name):
         pytest.skip(f"{name} is not installed")
     scene, times = moving_probes()["spherical joint"], np.array([0.0, 0.02])
     twice = scene.with_(joint=(*scene.joint, scene.joint[-1].model_copy(update={"name": "again"})))
     setting = engine(name).settings_of(scene, family)[-1]
     once, again = (engine(name).run(s, times, setting) for s in (scene, twice))
-    assert once.outcome is again.outcome is Outcome.COMPLETED, (once.message, again.message)
+    assert {once.outcome, again.outcome} == {Outcome.COMPLETED}, (once.message, again.message)
     assert float(error_series(scene, once, again).max()) < 1e-9
 
 
@@ -147,7 +150,8 @@ def test_every_engine_but_mbref_runs_the_copies() -> None:
 
 
 def test_the_copies_cut_the_loop_at_each_of_its_joints() -> None:
-    """The spanning tree of the adapters has one closure; in the copies, each joint is the closure of one."""
+    """The adapters cut a loop at one joint, the closure of their spanning tree. Over the four-bar and its
+    copies in other orders, every joint is a closure."""
     scene, exact = four_bar()
     cuts = {scene.joint[spanning_tree(scene).closures[0].joint].name}
     for name, relation in COPIES.items():

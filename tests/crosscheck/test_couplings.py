@@ -39,8 +39,8 @@ LACKS = {"pinocchio": "coupling", "simbody": "armature", "bullet": "armature"}  
 
 
 def test_run_with_another_gear_ratio_violates_the_coupling_by_its_slip():
-    """A gear that turns by -0.51 q₁ instead of -0.5 q₁ violates q₂ + 0.5 q₁ = 0 by 0.01 q₁, and the rates by
-    0.01 q₁'. From rest under a constant torque, q₁' = 2 q₁ / t at t = 1 s."""
+    """The scene's second gear turns by q₂ = -0.5 q₁. A run in which it turns by -0.51 q₁ violates this by
+    0.01 q₁, and the rates by 0.01 q₁'. From rest under a constant torque, q₁' = 2 q₁ / t at t = 1 s."""
     scene = gear_pair()
     motion = mbref.simulate(scene.with_("coupling[teeth].ratio", -0.51), times=np.linspace(0, 1, 21))
     turned = motion.joint("A").angle
@@ -57,8 +57,8 @@ def test_adapters_without_couplings_and_armatures_refuse_them_by_name(name):
 
 
 def test_armatures_count_in_the_start_velocities_of_least_kinetic_energy():
-    """Velocities that the scene leaves open minimise the kinetic energy of bodies and rotors: mbref's are the
-    judge's, in long doubles, to 1e-13 m/s of rounding. Without rotors some are over 1 cm/s different."""
+    """Velocities that the scene leaves open minimise the energy of bodies and rotors: mbref's are the
+    judge's, in long doubles, to rounding (1e-13 m/s). Without rotors they are over 1 cm/s different."""
     scene = spatial_chain()
     joints = [joint.model_copy(update={"armature": 0.0}) for joint in scene.joint]
     exact, bare = (
@@ -70,7 +70,7 @@ def test_armatures_count_in_the_start_velocities_of_least_kinetic_energy():
 
 
 def needs_what_is_missing(name, make):
-    """Return whether a scene has couplings or armatures, and the engine lacks them (LACKS)."""
+    """Return whether a scene has what an engine lacks by LACKS, couplings or armatures."""
     scene = make()
     parts = {"coupling": bool(scene.coupling), "armature": any(j.reflected_inertia for j in scene.joint)}
     return name in LACKS and parts[LACKS[name]]
@@ -83,8 +83,7 @@ PAIRS = [
 
 @pytest.mark.parametrize(("name", "make"), [pair for pair in PAIRS if needs_what_is_missing(*pair.values)])
 def test_refusal_of_an_engine_names_the_coupling_or_armature_that_it_lacks(name, make):
-    """LACKS names what each engine lacks. Its adapter refuses scenes with such parts on the engine's
-    behalf."""
+    """LACKS names what each engine lacks. The engine, and not its adapter, owns the refusal."""
     refusal = engine(name).cannot(make())
     assert refusal is not None and refusal.owner is Owner.ENGINE and LACKS[name] in refusal.reason
 
@@ -104,8 +103,8 @@ def test_engines_move_coupled_joints_as_the_reference(name, make):
 
 
 def test_drakes_own_stepping_keeps_couplings_and_armatures():
-    """Its step of 1e-4 s is of first order; a lost coupling or armature would give an error above 0.1. A
-    hundredth of that, 1e-3, is allowed."""
+    """Drake's own steps of 1e-4 s are of first order. A lost coupling or armature would give an error above
+    0.1; a hundredth of that, 1e-3 of the length or rad, is allowed."""
     pytest.importorskip("pydrake")
     scene = planetary().with_(duration=0.2)
     run = engine("drake").run(scene, np.array([0.0, 0.2]), Setting("discrete", {"step": 1e-4}))
@@ -138,13 +137,14 @@ ROUNDED = 1e-13  # m or rad; of angles and lengths up to 20 rad and 1 m
 
 
 def shifted(make, name: str, offset: float) -> Scene:
+    """Return a scene with the offset (m or rad) of one of its couplings."""
     return make().with_(f"coupling[{name}].offset", offset)
 
 
 @pytest.mark.parametrize("factor", [0.5, -1.0, 1.0 + 1e-9], ids=["half", "opposite", "1e-9 more"])
 def test_start_with_another_offset_is_refused(factor):
-    """The scene's offset is 0.4 rad; poses assembled for another one violate the judge's equation."""
-    scene, other = (shifted(gear_pair, "teeth", share * 0.4) for share in (1.0, factor))
+    """The offset is 0.4 rad; poses assembled for ``factor`` times 0.4 rad violate the judge's equation."""
+    scene, other = (shifted(gear_pair, "teeth", offset) for offset in (0.4, factor * 0.4))
     with pytest.raises(SceneError, match="teeth: the poses at the start violate it by"):
         checked_start(scene, mbref.assembled(other), mbref.angles_at_start(scene))
 
@@ -181,8 +181,8 @@ def test_engines_refuse_a_scene_that_is_not_assembled():
 
 
 def test_coordinates_of_a_reference_table_count_from_the_file_s_poses():
-    """The coupling's equation s = 0.003 m + 0.05 m · φ holds for displacement and angle of the table to 1e-13
-    m; the angle is also mbref's, to 1e-11 rad."""
+    """In coordinates that are zero in the file's poses, s = 0.003 m + 0.05 m · φ. The judge's table obeys it
+    to 1e-13 m; its angle is also mbref's, to 1e-11 rad."""
     scene = shifted(rack, "teeth", 0.003)
     table = reference_table(scene, TIMES)
     motion = mbref.simulate(scene, times=TIMES, rtol=1e-13)
@@ -191,8 +191,8 @@ def test_coordinates_of_a_reference_table_count_from_the_file_s_poses():
 
 
 def test_recorded_angle_that_counts_from_the_assembled_pose_is_judged_wrong():
-    """The reference's table, which counts from the file's pose, is judged right; one whose angle begins at
-    zero in the assembled pose is not."""
+    """The judge's own table, whose angle counts from the file's pose, is judged right. With an angle that is
+    zero in the assembled pose, where the motion begins, it is judged wrong."""
     scene = shifted(rack, "teeth", 0.003)
     table = reference_table(scene, TIMES)
     recorded = {key: table[key] for key in ("time", "A.angle", "B.displacement", "rack.position.y")}
@@ -208,8 +208,8 @@ def test_find_scenes_assembles_offsets_and_read_scenes_does_not(tmp_path):
 
 
 def test_mjcf_keeps_the_offset_of_a_coupling(tmp_path):
-    """The rack returns from its MJCF with its motion by mbref, to 1e-12 m; the motion without the offset of 3
-    mm is over 2 mm away."""
+    """A rack is written to MJCF and read again. By mbref both scenes move alike to 1e-12 m; the motion
+    without the offset of 3 mm is over 2 mm away."""
     pytest.importorskip("mujoco")
     scene, path = shifted(rack, "teeth", 0.003), tmp_path / "rack.xml"
     formats.write(scene, path)

@@ -28,17 +28,18 @@ def run(scene: Scene, times: np.ndarray, family: str, step: float) -> Trajectory
 
 
 def one_body(**changes: object) -> Scene:
-    """Return a body with a full inertia matrix, 0.2 m from a joint at the origin whose axis is SIDEWAYS."""
+    """Return a body with a full inertia matrix, 0.2 m from the origin at a right angle to SIDEWAYS."""
     held = body("b", (0.0, 0.2, 0.0), TURNED, mass=2.0)
     return Scene(name="one", body=(held,), duration=1.0, **changes)
 
 
-def hinge(kind: type = Revolute, bodies: tuple[str, str] = ("ground", "b")) -> dict[str, object]:
+def hinge(kind: type, bodies: tuple[str, str]) -> dict[str, object]:
+    """Return the field ``joint`` of a scene: a joint at the origin along SIDEWAYS."""
     return {"joint": (kind(name="J", bodies=bodies, anchor=(0.0, 0.0, 0.0), axis=SIDEWAYS),)}
 
 
 def moment_of_inertia(scene: Scene) -> float:
-    """Return the moment of inertia (kg m²) about SIDEWAYS through the origin, across the arm."""
+    """Return the moment of inertia (kg m²) of `one_body` about SIDEWAYS through the origin (Steiner)."""
     turn = rotations.to_matrix(np.array(scene.body[0].orientation))
     axis = np.array(SIDEWAYS)
     return float(axis @ turn @ np.array(INERTIA) @ turn.T @ axis) + scene.body[0].mass * 0.2**2
@@ -55,7 +56,7 @@ def angle(scene: Scene, trajectory: Trajectory) -> np.ndarray:
 @pytest.mark.parametrize(
     ("name", "duration", "family", "step", "errors"),  # measured, of poses and of velocities
     [
-        ("planar_slider_crank", 0.2, "tuned", 6.25e-5, (2.8e-11, 1.1e-11)),  # 7 steps at rank 41 of 42
+        ("planar_slider_crank", 0.2, "tuned", 6.25e-5, (2.8e-11, 1.1e-11)),
         ("planar_slider_crank", 0.05, "trapezoidal", 1e-4, (6.4e-6, 7.1e-6)),
         ("spatial_slider_crank", 0.02, "tuned", 3.125e-5, (7.5e-12, 2.1e-11)),
         ("spatial_slider_crank", 0.01, "defaults", 2e-5, (1.5e-5, 1.5e-5)),
@@ -83,8 +84,8 @@ def test_exudyns_families_move_mechanisms_within_their_measured_errors(name, dur
 
 
 def test_exudyns_trapezoidal_rule_has_order_two_and_extrapolation_more_than_five():
-    """The order is the binary logarithm of the errors' ratio at 2 and 1 ms. The rule's error has even powers
-    of the step alone, of which extrapolation removes two: order six, 5.7 at these steps."""
+    """The order is the binary logarithm of the ratio of errors at 2 and 1 ms. The rule's error has only even
+    powers of the step; extrapolation removes two, which leaves order six (5.7 is measured)."""
     scene = SCENES["spatial_slider_crank_gravity"]()
     times, truth = np.linspace(0, 0.1, 6), truth_for(scene)
     errors = {
@@ -113,23 +114,23 @@ def test_exudyn_gives_the_true_accelerations():
 @pytest.mark.parametrize("kind", [Revolute, Cylindrical])
 @pytest.mark.parametrize("bodies", [("ground", "b"), ("b", "ground")])
 def test_exudyn_swings_a_body_on_a_torsion_spring_beyond_a_turn(kind: type, bodies: tuple[str, str]):
-    """A damped oscillation φ = 8 rad (1 - e^(-δt) (cos ωt + δ/ω sin ωt)) about the natural angle, with the
-    decay δ = c / (2 J) and ω² = k / J - δ². The error is at most ten times the measured 8.2e-10 rad."""
+    """From rest, φ = 8 rad (1 - e^(-δt) (cos ωt + δ/ω sin ωt)), a damped oscillation about the natural angle,
+    with δ = c / (2 J) and ω² = k / J - δ². The error is at most ten times the measured 8.2e-10 rad."""
     natural = 8.0 if bodies[0] == "ground" else -8.0  # the coordinate of the second body about the first
     spring = TorsionSpring(joint="J", stiffness=2.0, damping=0.05, natural_angle=natural)
     scene = one_body(**hinge(kind, bodies), load=(spring,))
     times = np.linspace(0, 1, 6)
-    j = moment_of_inertia(scene)
-    decay, rate = 0.05 / (2 * j), math.sqrt(2.0 / j)
-    damped = math.sqrt(rate**2 - decay**2)
+    inertia = moment_of_inertia(scene)
+    decay = 0.05 / (2 * inertia)
+    damped = math.sqrt(2.0 / inertia - decay**2)
     swing = np.exp(-decay * times) * (np.cos(damped * times) + decay / damped * np.sin(damped * times))
     off = angle(scene, run(scene, times, "tuned", 5e-3)) - 8.0 * (1 - swing)
     assert np.abs(np.angle(np.exp(1j * off))).max() < MARGIN * 8.2e-10, "modulo a turn"
 
 
 def test_exudyn_keeps_joints_of_every_kind_closed():
-    """Residuals of the judge's joint equations and their rates, with and without drivers, are at most ten
-    times the measured 5.7e-14 (of the length, or rad) and 2.3e-12 1/s."""
+    """With and without drivers, residuals of the judge's joint equations are at most ten times the measured
+    5.7e-14 (of the length, or rad), and their rates at most ten times the measured 2.3e-12 1/s."""
     for scene in (every_joint(), driven()):
         measured = measure(scene, run(scene, np.linspace(0, 0.2, 6), "tuned", 2.5e-3))
         assert measured["violation_position"] < MARGIN * 5.7e-14, (scene.name, measured)
@@ -147,20 +148,19 @@ def test_exudyn_tumbles_a_torque_free_body_as_the_truth():
 
 
 def test_exudyns_motion_does_not_depend_on_the_samples():
-    """Four of eleven even samples, which begin after t = 0, give the positions of the eleven, to ten times
-    the measured difference (m)."""
+    """A run with four of eleven samples, without t = 0, has the positions of a run with all eleven, to ten
+    times the measured difference (m)."""
     scene = SCENES["planar_slider_crank_gravity"]()
-    even = np.linspace(0, 0.1, 11)
-    some = even[[3, 4, 8, 10]]
+    times, some = np.linspace(0, 0.1, 11), [3, 4, 8, 10]
     measured = {"tuned": 2.7e-14, "alpha": 1.4e-9}  # m; Newton's method of `alpha` ends earlier
-    for family, tolerance in measured.items():
-        dense, sparse = run(scene, even, family, 1e-4), run(scene, some, family, 1e-4)
-        assert np.abs(dense.position[[3, 4, 8, 10]] - sparse.position).max() < MARGIN * tolerance
+    for family, difference in measured.items():
+        dense, sparse = run(scene, times, family, 1e-4), run(scene, times[some], family, 1e-4)
+        assert np.abs(dense.position[some] - sparse.position).max() < MARGIN * difference
 
 
 def test_exudyns_defaults_end_at_redundant_constraints_with_the_cause():
-    """In a planar mechanism in space its matrix is singular, and it finds zero initial accelerations, as the
-    message says; the start is the only sample."""
+    """A planar mechanism in space has redundant constraints: Exudyn's matrix is singular, and Exudyn finds
+    zero initial accelerations, as the message says. The start is the only sample."""
     scene = SCENES["planar_slider_crank"]()
     trajectory = ENGINE.run(scene, np.linspace(0, 0.1, 11), Setting("defaults", {"step": 1e-3}))
     assert trajectory.outcome is Outcome.SINGULAR_MATRIX, (trajectory.outcome, trajectory.message)
@@ -183,18 +183,17 @@ def test_exudyns_trapezoidal_rule_ends_at_a_singular_position_with_right_samples
 
 
 def test_exudyns_static_analysis_ends_before_a_singular_pose():
-    """The crank reaches θ = π at 1 s, where the driven parallelogram can take two branches; the run ends
-    within two of its steps of 0.05 s before it."""
-    quarter = math.pi / 2
+    """A driver turns the upright crank of a parallelogram by 90° in 1 s. There all links are in one line and
+    two branches meet. The run ends within two of its steps of 0.05 s before this pose."""
     scene = SCENES["four_bar"]()
-    scene = scene.with_(driver=(Driver(joint="A", polynomial=(0.0, -quarter)),))
+    scene = scene.with_(driver=(Driver(joint="A", polynomial=(0.0, -math.pi / 2)),))
     trajectory = ENGINE.run(scene, np.linspace(0, 1, 5), Setting("static", {"step": 0.05}))
     assert trajectory.outcome is Outcome.SINGULAR_MATRIX, trajectory.outcome
     assert "loses rank at t = 1 s" in trajectory.message and 0.9 < trajectory.t_end < 1, trajectory.message
 
 
 def test_exudyn_moves_a_driven_scene_without_masses_and_refuses_a_free_one():
-    """Positions of kinematics are equal to the bit with and without masses."""
+    """Positions of the driven scene are equal to the bit with masses and without."""
     scene = SCENES["four_bar"]()
     bare = scene.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in scene.body))
     assert ENGINE.cannot(bare) is None

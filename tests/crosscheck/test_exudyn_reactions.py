@@ -23,8 +23,9 @@ DRIVEN = [(name, True) for name, kind in JOINT_TYPES.items() if kind.facts.drive
 @pytest.mark.parametrize("bodies", [("ground", "b"), ("b", "ground")])
 @pytest.mark.parametrize(("kind", "driven"), [*UNDRIVEN, *DRIVEN])
 def test_exudyns_reaction_causes_the_acceleration_of_the_body(kind, driven, bodies):
-    """One body on one joint: by Newton's and Euler's equations (``balance``) the reaction, gravity and a
-    moment leave at most ten times the measured 1.6e-10 of the largest force, or moment over the length."""
+    """One body on one joint under gravity and a moment. ``balance`` is what Newton's and Euler's equations
+    leave of reaction, loads and acceleration: at most ten times the measured 1.6e-10 of the largest force, or
+    of the largest moment over the length."""
     scene = Scene(
         name="held",
         body=(BODY,),
@@ -39,8 +40,8 @@ def test_exudyns_reaction_causes_the_acceleration_of_the_body(kind, driven, bodi
 
 
 def test_exudyn_gives_no_accelerations_and_reactions_with_an_accelerating_driver():
-    """Exudyn's initial multipliers lack the driver's acceleration, here of a sine. With a driver of constant
-    rate both are given."""
+    """Exudyn's initial multipliers lack the driver's acceleration. Its run with a driver by a sine has
+    neither accelerations nor reactions; with a driver of constant rate it has both."""
     joint = Revolute.at("J", ("ground", "b"), **PLACES)
     shaken, turned = (
         ENGINE.run(

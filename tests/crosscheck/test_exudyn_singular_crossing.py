@@ -15,13 +15,13 @@ from mbref.scene import Scene
 from mbref.scenes import SCENES
 from tests.crosscheck.measured import MARGIN, ROUNDING
 
-ROUGH = 1e-4  # m, rad and their rates; error of the states that are projected
+ROUGH = 1e-4  # m, and of quaternions and rates; error that is added to exact states
 SINGULAR = 0.061192068340  # s, where the equal slider-crank's crank has turned to π/2
 
 
 def test_exudyns_samples_at_and_next_to_a_singular_position_are_true():
-    """The slider-crank with equal links has a closed form. At 50 µs before it, at it and 50 µs after it the
-    error is at most ten times the measured 2.8e-12 (of the length, or rad)."""
+    """The slider-crank with equal links has a closed form. At its singular position, 50 µs before it and 50
+    µs after it the error is at most ten times the measured 2.8e-12 (of the length, or rad)."""
     scene = SCENES["planar_slider_crank_equal"]()
     times = np.array([0.03, SINGULAR - 5e-5, SINGULAR, SINGULAR + 5e-5, 0.08])
     run = ENGINE.run(scene, times, Setting("tuned", {"step": 1e-4}))
@@ -31,8 +31,8 @@ def test_exudyns_samples_at_and_next_to_a_singular_position_are_true():
 
 
 def test_exudyns_runs_through_a_singular_position_repeat_to_the_bit():
-    """In this random mechanism Newton's iteration stalls at t = 0.0494 s; the run continues by extrapolation,
-    and three runs are equal."""
+    """In the random mechanism 27 Newton's iteration stalls at t = 0.0494 s. The run continues by
+    extrapolation, and three runs are equal."""
     scene = mechanism(27)
     times = np.linspace(0, scene.duration, 9)
     setting = [setting for setting in ENGINE.settings(scene) if setting.family == "tuned"][-1]
@@ -56,7 +56,7 @@ def true_nodes(scene: Scene, times: np.ndarray) -> tuple[np.ndarray, np.ndarray,
 
 
 def test_exact_states_before_a_singular_position_are_extrapolated_to_and_beyond_it():
-    """Twelve samples of the closed form 0.6 ms apart end 0.2 ms before it. At it and 0.2 ms after it the
+    """Twelve exact samples, 0.6 ms apart, end 0.2 ms before the singular position. At it and 0.2 ms after it
     errors are at most ten times the measured 1.4e-14 m and 1.6e-11 m/s."""
     scene = SCENES["planar_slider_crank_equal"]()
     nodes = true_nodes(scene, SINGULAR - 2e-4 - 6e-4 * np.arange(12)[::-1])
@@ -67,9 +67,9 @@ def test_exact_states_before_a_singular_position_are_extrapolated_to_and_beyond_
 
 
 def test_projection_of_rough_states_closes_the_joints():
-    """The exact state of the five-bar at 4 ms gets random errors of 1e-4 (ROUGH). Projected, its joints are
-    closed to rounding by the judge's equations (rates to 4.4e-14 m/s, measured), and it is at most ten times
-    as far from the exact state."""
+    """The exact state of the five-bar at 4 ms gets random errors of 1e-4 (ROUGH) and is projected. By the
+    judge's equations its joints are then closed to rounding, and their rates are at most ten times the
+    measured 4.4e-14 m/s. It stays within ten times ROUGH of the exact state."""
     scene, t = SCENES["five_bar"](), 0.004
     rng = np.random.default_rng(1)
     coordinates, rates = true_nodes(scene, np.array([t]))[1][:2, 0]
@@ -86,9 +86,9 @@ def test_projection_of_rough_states_closes_the_joints():
 
 
 def test_projection_moves_a_light_rod_and_not_a_heavy_flywheel():
-    """The rod is 1e-4 m (ROUGH) off its joint with the flywheel. Weighted with the masses, the least motion
-    that closes the joint moves the rod, by at least a tenth of the gap, and the flywheel by less than a
-    thousandth."""
+    """The rod is 1e-4 m (ROUGH) off its joint with the flywheel. The projection is the least motion that
+    closes the joint, weighted with the masses: it moves the rod by more than a tenth of the gap and the
+    flywheel by less than a thousandth."""
     scene = SCENES["planar_slider_crank_heavy"]()
     coordinates, rates = true_nodes(scene, np.array([0.5]))[1][:2, 0]
     rough = coordinates.copy()

@@ -24,19 +24,19 @@ OTHER_TICKS = {  # building and stepping (s) of families that read the clock at 
 
 @pytest.mark.parametrize(("name", "part"), ENGINES)
 def test_cost_of_a_run_is_cpu_time_of_building_and_of_stepping(name, part, monkeypatch):
-    """The CPU clock of `ticks` advances 1 s at each reading. It is read at the start and end of building, and
-    of each of three intervals of stepping, or of one call for all; OTHER_TICKS has families that read it more
-    often. A wall clock would give fractions of a second."""
+    """The CPU clock of `ticks` advances 1 s at each reading. It is read at the start and end of building: 1
+    s. It is read at the start and end of stepping to each of three samples, 3 s, or of one call for all, 1 s.
+    OTHER_TICKS has families that read it more often. A wall clock would give fractions of a second."""
     scene = able(name, driven_arm(), SCENES["planar_slider_crank_gravity"]().with_(duration=0.01))
     for setting in coarsest(name, scene, part):
-        own = OTHER_TICKS.get((name, setting.family))
         is_one_call = name in IN_ONE_CALL or setting.family.endswith("compiled")
-        expected = own or (BUILD, 1.0 if is_one_call else STEPPING)
+        usual = (BUILD, 1.0 if is_one_call else STEPPING)
+        expected = OTHER_TICKS.get((name, setting.family), usual)
         assert ticks(name, scene, setting, monkeypatch) == expected, setting
 
 
 def ticks(name, scene, setting, patch):
-    """Return the costs of building and stepping by a clock of CPU time that ticks 1 s at each reading."""
+    """Return the costs of building and of stepping to three samples; the CPU clock ticks at each reading."""
     clock = itertools.count(1)
     with patch.context() as patched:
         patched.setattr(time, "process_time", lambda: float(next(clock)))
@@ -46,7 +46,7 @@ def ticks(name, scene, setting, patch):
 
 
 def test_cost_of_a_run_of_a_files_own_model_is_cpu_time(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """By the clock of `ticks`, building takes 1 s and stepping to three samples 3 s."""
+    """MuJoCo runs the MJCF file's model. By the clock of `ticks` it builds for 1 s and steps for 3 s."""
     pendulum = '<body name="b"><joint type="hinge" axis="0 1 0"/><geom size="0.1" pos="0 0 -1"/></body>'
     path = tmp_path / "pendulum.xml"
     path.write_text(f"<mujoco><worldbody>{pendulum}</worldbody></mujoco>")
@@ -56,15 +56,15 @@ def test_cost_of_a_run_of_a_files_own_model_is_cpu_time(tmp_path, monkeypatch: p
 
 
 TIMES = np.array([0.0, 0.4 * END, END])
-WITHIN = 2e-3  # rad and m; exchanged phases, frequencies or drivers move the bodies by more than 8e-3
+WITHIN = 2e-3  # m; exchanged phases, frequencies or drivers move the bodies by more than 8e-3 m
 RATES = 10 * WITHIN  # rad/s and m/s; drivers of 5 and 9 rad/s magnify errors of the coordinate by as much
 ROUGH = ("cpodes",)  # off by more than 8e-3 on a prescribed motion; it runs the model of the other families
 
 
 @pytest.mark.parametrize(("name", "part"), ENGINES)
 def test_an_engine_follows_drivers_that_turn_an_arm_and_slide_a_block_along_it(name, part):
-    """Arm at 0.5 m · e(φ), block at (1 m + s) · e(φ), with the drivers' φ(t) and s(t). Poses are allowed 2e-3
-    m or rad and rates ten times this; exchanged drivers, frequencies or phases give over 8e-3."""
+    """The drivers prescribe the arm's angle φ(t) and the block's way s(t). With e = (cos φ, sin φ, 0) the arm
+    is at 0.5 m · e and the block at (1 m + s) · e. Positions may be off by WITHIN, velocities by RATES."""
     scene = able(name, driven_arm())
     angle, rate = TURN.value(TIMES), TURN.rate(TIMES)
     along, speed = 1.0 + SLIDE.value(TIMES), SLIDE.rate(TIMES)
@@ -92,8 +92,8 @@ WITHOUT_RUNS = "casadi"  # its sweep runs compiled code, and that not beside Ope
 
 @pytest.mark.parametrize("name", [n for n in engine_names() if n != WITHOUT_RUNS])
 def test_families_are_swept_from_coarse_to_fine(name: str) -> None:
-    """Within a family that serves the scene one option (step, tolerance, accuracy) falls over three settings
-    or more; every option is in the engine's documented ones."""
+    """In each family one option of KNOBS falls from setting to setting, of which there are three or more. The
+    engine documents the family and all its options."""
     if not installed(name):
         pytest.skip(f"{name} is not installed")
     simulator, count = engine(name), 0
@@ -124,15 +124,15 @@ FIXED = {"mujoco": "tuned", "pinocchio": "proximal", "exudyn": "tuned"}  # famil
 
 @pytest.mark.parametrize("name", FIXED)
 def test_scene_driven_twice_as_fast_has_steps_half_as_long(name: str) -> None:
-    """Steps of the sweep are fractions of the time of a turn of the driven four-bar; gains and rounded
-    numbers of steps leave the ratio within 0.4 to 0.6."""
+    """Steps of a sweep are fractions of the time in which the driven four-bar turns once. Rounded numbers of
+    steps leave the ratio within 0.4 to 0.6. Both scenes have no given velocities."""
     scene = SCENES["four_bar"]()
     (driver,), at_rest = scene.driver, {"velocity": None, "angular_velocity": None}
     scene = scene.with_(body=[body.model_copy(update=at_rest) for body in scene.body])
     fast = scene.with_(driver=(driver.model_copy(update={"polynomial": (0.0, 2 * driver.polynomial[1])}),))
     slow_steps, fast_steps = (
-        [s.options.get("step", 1.0) for s in engine(name).settings(each) if s.family == FIXED[name]]
+        [s.options["step"] for s in engine(name).settings(each) if s.family == FIXED[name]]
         for each in (scene, fast)
     )
     assert slow_steps
-    assert all(0.4 < f / s < 0.6 for s, f in zip(slow_steps, fast_steps, strict=True))
+    assert all(0.4 < short / long < 0.6 for long, short in zip(slow_steps, fast_steps, strict=True))

@@ -46,8 +46,8 @@ def run_of(name: str, scene_name: str, times: np.ndarray, setting: Setting) -> T
 
 @pytest.mark.parametrize("name", ["planar_slider_crank_equal", "spatial_slider_crank", "four_bar_gravity"])
 def test_symbolic_equations_of_a_tree_give_the_true_motion(name: str):
-    """SciPy integrates them at a tolerance of 1e-9 over a tenth of the motion. Errors of positions against
-    the judge's truth are below a hundred tolerances: 1e-7 m."""
+    """SciPy integrates the equations at a tolerance of 1e-9 over a tenth of the motion. Positions at its end
+    differ from the judge's truth by less than a hundred tolerances, 1e-7 m."""
     scene = SCENES[name]()
     equations, end = TreeEquations(scene), 0.1 * scene.duration
 
@@ -62,8 +62,8 @@ def test_symbolic_equations_of_a_tree_give_the_true_motion(name: str):
 
 @pytest.mark.parametrize(("name", "setting"), RUNS, ids=str)
 def test_generated_code_gives_the_true_motion_and_reactions(name: str, setting: Setting) -> None:
-    """Errors of poses, velocities and reactions from the judge's truth of a slider-crank in space, relative
-    to its length and largest values, are below 1e-8, a hundred tolerances."""
+    """A slider-crank in space. Errors of poses, velocities and reactions from the judge's truth, relative to
+    its length and largest values, are below 1e-8, at least a hundred tolerances."""
     scene = SCENES["spatial_slider_crank_gravity"]()
     run = run_of(name, scene.name, np.linspace(0, scene.duration, 5), setting)
     assert run.outcome is Outcome.COMPLETED, run.message
@@ -74,8 +74,8 @@ def test_generated_code_gives_the_true_motion_and_reactions(name: str, setting: 
 
 @pytest.mark.parametrize("name", GENERATORS)
 def test_motion_of_generated_code_does_not_depend_on_the_samples(name: str) -> None:
-    """Samples at 0.1 and 0.25 s, at 0, 0.1 and 0.25 s, and at 0 alone. Positions of one time differ by less
-    than 1e-8 m, a hundred tolerances; at 0 s they are equal."""
+    """Runs have samples at 0.1 and 0.25 s, at 0, 0.1 and 0.25 s, and at 0 s alone. Positions of two runs at
+    0.1 and 0.25 s differ by less than 1e-8 m, at least a hundred tolerances; at 0 s they are equal."""
     times, setting = np.array([0.1, 0.25]), SETTINGS[name][0]
     run = run_of(name, "planar_slider_crank_gravity", times, setting)
     whole = run_of(name, "planar_slider_crank_gravity", np.array([0.0, *times]), setting)
@@ -96,7 +96,8 @@ def test_motion_of_generated_code_does_not_depend_on_the_samples(name: str) -> N
     ],
 )
 def test_scenes_without_symbolic_equations_are_refused_with_the_reason(name, scene, reason):
-    """None are derived for a driver, a spring, a ball joint on the ground, or closures that are redundant."""
+    """No symbolic equations are derived for a driver (four_bar), a spring (flyball_governor), a ball joint on
+    the ground (heavy_top) and redundant closures (five_bar_gravity)."""
     found = engine(name).cannot(SCENES[scene]())
     assert found is not None and found.owner is Owner.ADAPTER and reason in found.reason, found
 
@@ -109,7 +110,7 @@ def test_casadi_refuses_scenes_if_no_c_compiler_is_installed(monkeypatch: pytest
 
 
 def test_a_file_in_the_cache_is_found_by_its_origin_unless_it_is_damaged(tmp_path, monkeypatch):
-    """The origin is the text from which a file was made; a damaged file has another checksum than stored."""
+    """The origin is the text from which the file was made; damage changes the file's checksum."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert file_cache.stored("folder", "origin", ".txt") is None
     path = file_cache.store("folder", "origin", ".txt", lambda target: target.write_text("whole"))

@@ -51,26 +51,27 @@ def test_links_of_a_tree_are_in_depth_first_order(scene: Scene) -> None:
 
 @given(graphs())
 def test_tree_with_its_closures_has_the_mobility_of_the_scene(scene: Scene) -> None:
-    """Joint velocities less rows of closures = 6 per body less rows of joints (a rod's own spin apart)."""
+    """The scene has 6 velocities per body less the rows of its joints, redundant or not. The tree has as many
+    joint velocities less rows of closures, apart from the spin of each rod about its axis."""
     tree = spanning_tree(scene)
-    counted = 6 * len(scene.body) - sum(joint.facts.rows for joint in scene.joint)
+    counted = 6 * len(scene.body) - sum(each.facts.rows for each in scene.joint)
     spins = len(rods(tree))
     assert tree.nv - spins - sum(CLOSURE_ROWS[c.kind] for c in tree.closures) == counted
 
 
 @given(graphs())
 def test_spatial_inertias_of_links_and_of_bodies_have_one_sum(scene: Scene) -> None:
-    """Sums of mass, first and second moments about the origin, to 1e-12 of the largest: rounding of 15 links.
-    The tree splits bodies and takes mass from them for a rod, which is half its mass at either end. A half at
-    the ground is taken from no body: it is a surplus of the links."""
+    """The tree splits bodies into links. It takes the mass of a rod from the bodies at its ends, half from
+    each; a half at the ground is taken from no body and is a surplus of the links. Mass, first and second
+    moments about the origin have equal sums to 1e-12 of the largest: rounding of 15 links."""
     tree = spanning_tree(scene)
     links = sum(spatial_inertia(k.mass, k.position + k.offset, without_spin(k)) for k in tree.links)
     surplus = sum(
         (
             spatial_inertia(rod.mass / 2, point, np.zeros((3, 3)))
             for rod in rods(tree)
-            for body, point in rod.ends
-            if body == GROUND_LINK
+            for end, point in rod.ends
+            if end == GROUND_LINK
         ),
         start=np.zeros((4, 4)),
     )
@@ -99,7 +100,7 @@ def spatial_inertia(mass: float, centre: np.ndarray, inertia: np.ndarray) -> np.
 
 @given(graphs())
 def test_every_link_has_a_positive_mass_and_inertia(scene: Scene) -> None:
-    """Engines refuse others. The least principal moment of inertia is positive."""
+    """Engines refuse links without mass. The least principal moment of inertia is positive."""
     for link in spanning_tree(scene).links:
         least = np.linalg.eigvalsh(link.inertia)[0]
         assert link.mass > 0 and least > 0
@@ -107,20 +108,20 @@ def test_every_link_has_a_positive_mass_and_inertia(scene: Scene) -> None:
 
 @given(graphs(), st.data())
 def test_a_driven_joint_is_never_cut_and_has_one_coordinate(scene: Scene, data: st.DataObject) -> None:
-    """The driver is of any joint of the random scene that may have one; ``nv`` is the number of
-    coordinates."""
-    names = [joint.name for joint in scene.joint if joint.facts.driven]
+    """The driver is of any joint that may have one; ``nv`` is the number of coordinates."""
+    names = [each.name for each in scene.joint if each.facts.driven]
     assume(names)
     name = data.draw(st.sampled_from(names))
     scene = scene.with_(driver=(Driver(joint=name, polynomial=(0.0, 1.0)),))
     tree = spanning_tree(scene)
-    assert [joint.name for joint in scene.joint].index(name) not in [c.joint for c in tree.closures]
+    assert name not in [scene.joint[cut.joint].name for cut in tree.closures]
     assert 0 <= tree.coordinate(scene, name) < tree.nv
 
 
 @pytest.mark.parametrize("kind", ["revolute", "cylindrical", "universal", "spherical", "planar"])
 def test_a_loop_is_cut_at_its_joint_with_most_freedoms(kind: str) -> None:
-    """A spherical joint is closed by a point; another one by splitting a body, whose parts are welded."""
+    """In a ring of hinges a joint of the kind is cut: a spherical one is replaced by a point of two links;
+    any other carries half of a body, which a weld holds to its other half."""
     (closure,) = spanning_tree(ring(kind)).closures
     expected = "point" if kind == "spherical" else "weld"
     cut = ring(kind).joint[closure.joint]
@@ -130,7 +131,7 @@ def test_a_loop_is_cut_at_its_joint_with_most_freedoms(kind: str) -> None:
 
 @pytest.mark.parametrize(("kind", "axis"), [("fixed", {}), ("translational", {"axis": X})])
 def test_a_body_is_split_in_halves_to_cut_a_loop_of_equal_joints(kind: str, axis: dict) -> None:
-    """Two bodies of 2 kg and three joints in a loop: body b becomes two links of 1 kg."""
+    """Two bodies of 2 kg, a and b, and three joints are a loop. Body b becomes two links of 1 kg."""
     pairs = (("ground", "a"), ("a", "b"), ("b", "ground"))
     bodies = [block(name, (0.0, 0.0, 0.0), 2.0) for name in "ab"]
     joints = [joint(f"j{i}", kind, *pair, **axis) for i, pair in enumerate(pairs)]
@@ -140,8 +141,8 @@ def test_a_body_is_split_in_halves_to_cut_a_loop_of_equal_joints(kind: str, axis
 
 
 def test_a_rod_takes_less_than_half_of_the_effective_mass_at_its_ends() -> None:
-    """A distance joint becomes a rod, half of whose mass is taken from the body at each end; more than half
-    of the mass that a force feels there stays."""
+    """A distance joint becomes a rod, whose mass is taken from the bodies at its ends, half from each. That
+    is less than half of the effective mass there, which is the mass that a force at the point feels."""
     scene = every_joint()
     tree = spanning_tree(scene)
     (rod,) = rods(tree)
@@ -152,7 +153,7 @@ def test_a_rod_takes_less_than_half_of_the_effective_mass_at_its_ends() -> None:
 
 @given(graphs(), st.sampled_from([(), ("spherical", "revolute")]))
 def test_loops_are_cut_between_links_and_not_at_the_ground_on_request(scene, closes):
-    """`between_links` asks for it; a scene then has as many cuts as without it."""
+    """With ``between_links`` no cut is at the ground, and there are as many cuts as without it."""
     cuts = spanning_tree(scene, closes).closures
     assume(cuts)
     between = spanning_tree(scene, closes, between_links=True).closures
@@ -179,7 +180,8 @@ def test_a_four_bar_is_cut_at_its_last_joint_or_at_its_last_joint_between_links(
 
 
 def test_a_body_with_two_hinges_to_the_ground_is_split_if_the_ground_is_never_cut():
-    """Body a has 0.5 kg on either side of the weld; the other loops are cut at hinges between links."""
+    """Hinges 0 and 1 join body a to the ground: a loop that is nowhere between links. Its cut is a weld of
+    two halves of a, 0.5 kg each. The other loops are cut at hinges 2 and 4, between a and b."""
     two_loops = hinged(("ground", "a"), ("a", "ground"), ("a", "b"), ("b", "ground"), ("b", "a"))
     found = spanning_tree(two_loops, ("revolute",), between_links=True)
     assert [(c.kind, c.joint) for c in found.closures] == [("weld", 1), ("revolute", 2), ("revolute", 4)]

@@ -1,4 +1,5 @@
-"""Hints for engines that fail name the defect in the equations of an engine with one known defect."""
+"""The hint for an engine that fails names the term of its equations that is wrong. The engines are the
+example engine with one known defect."""
 
 import importlib.util
 from pathlib import Path
@@ -19,12 +20,12 @@ SPEC = importlib.util.spec_from_file_location("spatial_engine_with_defects", PAT
 example = importlib.util.module_from_spec(SPEC)
 SPEC.loader.exec_module(example)
 KNOWN = {specimen.scene.name: specimen for specimen in specimens()}
-NAMES = ("tumbling body", "pendulum", "spinning loop", "cylindrical driver", "torsion", "oscillator")
 
 
 class Defective(example.Mechanism):
-    """Equations of the example engine with one defect: no gravity or 2 % more, +ω × Jω, γ without velocities,
-    the driver's acceleration or a moment of opposite sign, or the last body's inertia 1 % larger."""
+    """Equations of the example engine with one ``defect``: "gravity" is left out or has 102 %, "gyroscopic"
+    moments ω × Jω, accelerations of a "driver" or a "moment" have the opposite sign, "gamma" (of J a = γ)
+    lacks its velocity terms, the last body's "inertia" has 101 %."""
 
     defect = ""
 
@@ -57,6 +58,7 @@ class Defective(example.Mechanism):
 
 
 def runner_with(defect, monkeypatch):
+    """Return a runner of the example engine with a defect, or with none ("")."""
     monkeypatch.setattr(example, "Mechanism", type("Mechanism", (Defective,), {"defect": defect}))
     return InProcess(example.ENGINE, "spatial")
 
@@ -86,15 +88,15 @@ def runner_with(defect, monkeypatch):
     ],
 )
 def test_hint_names_the_term_of_the_equations_that_is_wrong(defect, names, says, monkeypatch):
-    """`Defective` has the example engine's equations with one defect, such as gravity of 102 %. The engine
-    fails the check `truth` on the scenes ``names``, and the hint has the words ``says``."""
+    """The engine has the ``defect`` that `Defective` describes. It is said to have failed the check `truth`
+    on the scenes ``names``; the hint has the words ``says``."""
     runner = runner_with(defect, monkeypatch)
     found = hint(runner, [Failure(KNOWN[name], "truth") for name in names])
     assert says in found, found
 
 
 def test_hint_for_an_engine_with_right_accelerations_points_at_its_integration(monkeypatch):
-    """The example engine has no defect (""), and the failure of check truth is made up."""
+    """The example engine without a defect ("") is said to have failed the check `truth`."""
     found = hint(runner_with("", monkeypatch), [Failure(KNOWN["pendulum"], "truth")])
     assert "begin with the scene 'pendulum', check truth" in found
     assert "accelerations agree with the judge's, so look at the integration" in found
@@ -113,13 +115,16 @@ def test_result_of_verify_on_a_failing_engine_has_the_hint(monkeypatch):
     assert failing.to_record()["hint"] == failing.hint
 
 
-@pytest.mark.parametrize("name", [*NAMES, "force load", "turntable"])
+TERMS = ("tumbling body", "pendulum", "spinning loop", "cylindrical driver", "torsion", "oscillator")
+
+
+@pytest.mark.parametrize("name", [*TERMS, "force load", "turntable"])
 def test_terms_of_the_judge_give_the_accelerations_of_gausss_principle(name):
-    """Solved from mass matrix, forces and rows, in a later state of the principle's motion; differences are
-    below 1e-6 of the largest acceleration (m/s² or rad/s²)."""
+    """The terms of a hint are mass matrix, forces and rows. Their accelerations (m/s², rad/s²) in a later
+    state of the principle's motion are the motion's to 1e-6 of the largest one."""
     scene = KNOWN[name].scene
     motion = gauss_motion(scene, tuple(np.linspace(0.0, 0.2 * scene.duration, 5).tolist()))
-    own = np.concatenate([motion.acceleration[3], motion.angular_acceleration[3]], axis=-1)
+    exact = np.concatenate([motion.acceleration[3], motion.angular_acceleration[3]], axis=-1)
     found = accelerations(scene, terms_at(scene, motion, 3)).reshape(-1, 6)
     found[:, 3:] /= scene_length(scene)
-    assert np.abs(found - own).max() < 1e-6 * np.abs(own).max(), (found, own)
+    assert np.abs(found - exact).max() < 1e-6 * np.abs(exact).max(), (found, exact)

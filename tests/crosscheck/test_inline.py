@@ -20,7 +20,7 @@ WIRE = (0.6, 0.0, -0.8)
 
 
 def bead(bodies: tuple[str, str], **more) -> Scene:
-    """Return a body with a point on a wire that the first of ``bodies`` carries."""
+    """Return a body on a wire: an inline joint keeps a point of one of ``bodies`` on a line of the other."""
     wire = joint("J", "inline", *bodies, (0.3, 0.1, 0.0), axis=WIRE)
     return Scene(name="bead", gravity=(0.0, 0.0, -9.81), body=[{**BEAD, **more}], joint=[wire])
 
@@ -45,7 +45,7 @@ each = pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
 
 
 def test_a_body_on_a_wire_through_its_centre_slides_as_on_an_incline():
-    """s = g sin α t² / 2 with sin α = 0.8, up to 1 m, to 1e-13 m: some hundred roundings."""
+    """s = g t² / 2 times the wire's slope, 0.8: up to 1 m, to 1e-13 m, some hundred roundings."""
     scene = bead(("ground", "bead"), position=[0.3, 0.1, 0.0])
     motion = mbref.simulate(scene, times=TIMES)
     way = 9.81 * 0.8 * TIMES**2 / 2
@@ -55,8 +55,8 @@ def test_a_body_on_a_wire_through_its_centre_slides_as_on_an_incline():
 
 @each
 def test_both_formulations_of_the_reference_agree_on_inline_joints(scene):
-    """Natural coordinates and a tree, integrated in long doubles, differ by less than 1e-13 m, m/s² or
-    rad/s², some roundings of doubles."""
+    """Natural coordinates and a tree of joints, both integrated in long doubles, give positions and
+    accelerations that differ by less than 1e-13 m, m/s² or rad/s²."""
     a, b = (motion(scene, TIMES, EXTENDED, seconds=60.0) for motion in (natural_motion, tree_motion))
     assert not a.reason and not b.reason
     for field in ("position", "acceleration", "angular_acceleration"):
@@ -66,8 +66,8 @@ def test_both_formulations_of_the_reference_agree_on_inline_joints(scene):
 @each
 @pytest.mark.parametrize("method", ["taylor", "alf-dual+projection/dop853"])
 def test_mbref_moves_an_inline_joint_as_the_reference(scene, method):
-    """At a tolerance of 1e-12, errors of poses and reactions from the judge's truth and violations of
-    accelerations stay below a hundred tolerances."""
+    """At a tolerance of 1e-12, errors of poses and reactions from the judge's truth, and violations by
+    accelerations, stay below a hundred tolerances, 1e-10."""
     motion = mbref.simulate(scene, method=method, times=TIMES, rtol=1e-12)
     found = measure(scene, motion, truth_for(scene))
     assert max(found[k] for k in ("error", "reaction_error", "violation_acceleration")) < 1e-10, found
@@ -94,8 +94,8 @@ def test_engines_without_inline_joints_refuse_them_by_their_type(name):
 
 
 def test_an_inline_joint_in_place_of_a_second_bearing_leaves_fewer_redundant_rows():
-    """Of two hinges five rows are redundant, of a hinge and an inline joint two, of a ball and an inline
-    joint none; the shaft keeps one freedom."""
+    """Five rows hold a shaft to one freedom; a hinge has five, a ball joint three, an inline joint two.
+    Redundant are five of two hinges, two of hinge and inline, none of ball and inline."""
     assert mbref.diagnose(shaft("revolute", "revolute")).counts.redundant == 5
     cured = mbref.diagnose(shaft("revolute", "inline")).counts
     assert (cured.redundant, cured.degrees_of_freedom) == (2, 1)

@@ -1,4 +1,4 @@
-"""Loads along joints and over time / closed forms, both formulations of the reference, MuJoCo, MJCF."""
+"""Loads of joints and loads over time: in both formulations of the reference, in engines and in MJCF."""
 
 from pathlib import Path
 
@@ -42,8 +42,8 @@ MEASURED = {  # differences of positions (m), and of accelerations (of the large
     ids=["damped spring", "force switched on and off"],
 )
 def test_reference_formulations_displace_a_block_by_its_closed_form(formulation, scene, displacement):
-    """A damped oscillator from rest, and a cubic of time as acceleration from 0.5 s to 1.5 s, integrated: up
-    to 1 m, to 1e-15 m, the rounding of extended precision's motion to doubles."""
+    """A damped oscillator from rest, and a block whose acceleration is a cubic of time from 0.5 s to 1.5 s.
+    They move up to 1 m, as the closed forms to 1e-15 m, rounding to doubles."""
     motion = FORMULATIONS[formulation](scene, TIMES, EXTENDED)
     assert not motion.reason
     moved = (doubles(motion.position[:, 0]) - scene.body[0].position) @ AXIS
@@ -52,8 +52,8 @@ def test_reference_formulations_displace_a_block_by_its_closed_form(formulation,
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_reference_formulations_turn_a_wheel_by_its_closed_form(formulation):
-    """φ'' = M A sin(ω t + p) / I from rest, integrated twice: up to 1.2 rad, to 1e-15 rad, the rounding to
-    doubles."""
+    """From rest φ'' = M A sin(ω t + p) / I; integrated twice, φ grows up to 1.2 rad. The motion agrees to
+    1e-15 rad, its rounding to doubles."""
     motion = FORMULATIONS[formulation](scenes.wheel(), TIMES, EXTENDED)
     assert not motion.reason
     turned = 2 * np.arctan2(*doubles(motion.orientation)[:, 0, [3, 0]].T)
@@ -61,9 +61,9 @@ def test_reference_formulations_turn_a_wheel_by_its_closed_form(formulation):
 
 
 def test_energy_stays_under_constant_forces_and_undamped_springs_of_joints():
-    """T + V of the judge's motion by Gauss's principle, with T up to 0.7 J: V has k x² / 2 of the springs of
-    a cylindrical joint, and -F x and -M φ of its force and torque. The drift is at most ten times the
-    measured 1.7e-9 J, an error of the integration."""
+    """The judge's energy T + V has k x² / 2 of both springs of a cylindrical joint, and -F x and -M φ of its
+    constant force and torque. Along the motion by Gauss's principle T grows up to 0.7 J, and T + V drifts by
+    at most ten times the measured 1.7e-9 J, an error of the integration."""
     constant = [
         SlideSpring(joint="C", stiffness=30.0, natural_displacement=0.05),
         TorsionSpring(joint="C", stiffness=0.2, natural_angle=0.4),
@@ -84,9 +84,9 @@ CASES += [(of, OVER_TIME) for of in ("exudyn", "drake", "dart")]
 
 @pytest.mark.parametrize(("of", "name"), CASES)
 def test_engine_moves_loads_of_joints_and_over_time_as_the_reference(of, name):
-    """A body on a joint with this load for 0.1 s; over time, a polynomial, sine, table or switch is its
-    factor. Positions (m), and accelerations over the largest and at least 1 m/s², differ by at most ten times
-    MEASURED. Crosscheck integrates the accelerations of Drake's and DART's own mass matrices and forces."""
+    """The scene is a body on a joint with this load for 0.1 s. Loads over time have a polynomial, sine, table
+    or switch as factor. Positions (m), and accelerations over the largest or over 1 m/s², differ from the
+    reference by at most ten times MEASURED. Of Drake and DART crosscheck integrates the accelerations."""
     pytest.importorskip({"drake": "pydrake", "dart": "dartpy"}.get(of, of))
     scene, times, simulator = PROBES[name].with_(duration=0.1), np.linspace(0.0, 0.1, 4), engine(of)
     run = simulator.run(scene, times, simulator.best_settings(scene)[-1])
@@ -107,8 +107,8 @@ def test_engine_moves_loads_of_joints_and_over_time_as_the_reference(of, name):
     ],
 )
 def test_first_order_steps_with_joint_loads_converge_to_the_reference(of, module, family, options, name):
-    """A tenth of the step leaves at most a fifth of the error, below a thousandth of the way moved (measured
-    5.5e-4); a lost or reversed load would leave all."""
+    """A tenth of the step leaves less than a fifth of the error, below a thousandth of the way moved (5.5e-4
+    is measured). A lost or reversed load would leave about the way moved."""
     pytest.importorskip(module)
     scene, times = PROBES[name].with_(duration=0.2), np.array([0.0, 0.2])
     exact = doubles(natural_motion(scene, times, EXTENDED).position)
@@ -121,8 +121,8 @@ def test_first_order_steps_with_joint_loads_converge_to_the_reference(of, module
 
 
 def test_hinge_with_a_load_keeps_its_coordinate_when_a_loop_is_cut():
-    """Bennett's loop is cut at a hinge, which a closure of type "revolute" replaces, without a coordinate.
-    With a spring on every hinge the loop is cut in a body ("weld") and each hinge keeps its coordinate."""
+    """Bennett's loop is cut at a hinge, which a closure "revolute" replaces, without a coordinate. With a
+    spring on every hinge a body is cut ("weld"), and each hinge has its own coordinate."""
     scene = SCENES["bennett"]()
     springs = [TorsionSpring(joint=joint.name, stiffness=1.0) for joint in scene.joint]
     (whole,) = spanning_tree(scene, ("revolute",)).closures
@@ -133,7 +133,7 @@ def test_hinge_with_a_load_keeps_its_coordinate_when_a_loop_is_cut():
 
 @pytest.mark.parametrize(("of", "kind"), [("pinocchio", "sine"), ("exudyn", "table"), ("exudyn", "switched")])
 def test_adapter_refuses_a_function_of_time_that_it_does_not_map(of, kind):
-    """Pinocchio's adapter maps none, Exudyn's polynomials only. The refusal names the load."""
+    """Pinocchio's adapter maps none, Exudyn's only polynomials. The refusal names the load."""
     refused = engine(of).cannot(PROBES[f"{kind} loads over time"])
     assert refused.owner is Owner.ADAPTER and "load[0]" in refused.reason
 
@@ -154,8 +154,9 @@ def read(tmp_path: Path, text: str, **options: object):
 
 
 def test_joint_loads_return_from_exported_mjcf_with_their_motion(tmp_path):
-    """Motors are written with keyframe "loads", which the notes say. By the judge's reference both move alike
-    over 0.5 s, to 1e-13 m: rounding of the numbers in the file."""
+    """A scene of an MJCF file is written to MJCF and read again. Motors are written with a keyframe "loads"
+    of their controls, which the notes say. By the judge's reference both scenes move alike over 0.5 s to
+    1e-13 m, rounding of the numbers in the file."""
     scene = read(tmp_path, PLAIN, keyframe="on").scene
     exported = FORMAT.write(scene)
     assert "its motor is controlled in keyframe 'loads'" in " ".join(exported.left_out)
@@ -167,6 +168,6 @@ def test_joint_loads_return_from_exported_mjcf_with_their_motion(tmp_path):
 
 
 def test_load_over_time_is_left_out_of_exported_mjcf_with_a_note(tmp_path):
-    """A motor's load is switched on at 0.2 s."""
+    """The scene is that of an MJCF file, except that a motor's load is switched on at 0.2 s."""
     timed = read(tmp_path, PLAIN, keyframe="on").scene.with_("load[2].factor", Factor(start=0.2))
     assert "MJCF has no loads over time" in " ".join(FORMAT.write(timed).left_out)
