@@ -66,7 +66,7 @@ def every_joint(**changes) -> Scene:
 
 
 def driven() -> Scene:
-    """The same with the cylindrical and the translational joint driven by polynomials and sines."""
+    """The scene of `every_joint` with drivers of its cylindrical and its translational joint."""
     sine = Sine(amplitude=0.3, frequency=9.0)
     return every_joint(
         name="driven",
@@ -79,8 +79,8 @@ def driven() -> Scene:
 
 
 def ring(kind: str) -> Scene:
-    """A planar four-bar in three dimensions whose last joint, of the given kind, is the one to cut. Fixed,
-    revolute, cylindrical or universal: the planar motion is the same; the loop is redundant."""
+    """A four-bar in three dimensions whose last joint, of the given kind, is the one to cut. With a revolute,
+    cylindrical, universal or spherical joint the motion is the same planar one, and rows are redundant."""
     last = JOINT_TYPES[kind].at("C", ("b", "c"), anchor=(0.7, 0.5, 0.0), axis=Z, axes=(Z, (0.0, 1.0, 0.0)))
     spin = {"angular_velocity": (0.0, 0.0, 3.0)}
     return Scene(
