@@ -1,4 +1,4 @@
-"""Momentum, sentences on truths, and stored violations / two free bodies and plain records, by hand."""
+"""Drift of momentum / two free bodies by hand; violations of the suite as files, and their reduction."""
 
 import shlex
 from dataclasses import replace
@@ -34,8 +34,8 @@ def motion() -> Trajectory:
 
 
 def test_angular_momentum_drift_is_relative_to_spin_and_linear_momentum():
-    """Body b, 5 kg m² at 2 rad/s, gains 0.7 rad/s at one sample: 3.5 N m s. The scale is its largest spin,
-    13.5 N m s, and the momentum of body a, 6 kg m/s, times the scene's length."""
+    """Body b, 5 kg m² at 2 rad/s, gains 0.7 rad/s at the second sample only: 3.5 N m s. The scale is its
+    largest spin, 13.5 N m s, and the momentum of body a, 6 kg m/s, times the scene's length."""
     run = motion()
     run.angular_velocity[1, 1, 2] += 0.7
     found = momentum_series(SCENE, run)
@@ -54,9 +54,9 @@ def test_momentum_drift_of_turning_in_place_is_relative_to_the_spin():
 
 
 def test_impulses_of_gravity_forces_and_moments_are_no_drift():
-    """A motion in which gravity of 1 m/s² gives each body a velocity t has a drift over 0.1 for a scene
-    without gravity, and of rounding with it; so with a spin t of body b by 5 N m, and 3 t of body a by 6
-    N."""
+    """Under gravity of 1 m/s² each body falls at the velocity t: the drift is rounding, but over 0.1 by a
+    scene without gravity. A moment of 5 N m adds the spin t to body b (5 kg m²), and a force of 6 N adds the
+    velocity 3 t to body a (2 kg): in scenes with these loads the drift is rounding, too."""
     run = motion()
     fall = np.zeros((3, 2, 3))
     fall[:, :, 2] = -TIMES[:, None]
@@ -117,8 +117,8 @@ def needs_b_and_gravity(smaller: Scene) -> bool:
 
 
 def test_violation_is_reduced_to_the_parts_that_it_needs():
-    """The check fails as long as body b is there and gravity is not zero; the hinge, the moment, body a, the
-    spin and nine tenths of the duration of 1 s can go, within 40 trials."""
+    """The check fails as long as body b is there and gravity is not zero. Within 40 trials the hinge, the
+    moment, body a and the spin are removed, and the duration of 1 s falls below a tenth."""
     small = findings.shrunk(HINGED, needs_b_and_gravity, 40)
     assert [body.name for body in small.body] == ["b"] and not small.joint and not small.load
     assert small.gravity == HINGED.gravity and small.body[0].angular_velocity is None and small.duration < 0.1
@@ -130,7 +130,7 @@ def test_violation_that_needs_all_parts_is_not_reduced():
 
 
 def test_reduction_of_a_violation_ends_after_the_trials_allowed():
-    """At most 3 smaller scenes are tried, of more that would fail."""
+    """3 smaller scenes are tried where 3 are allowed; the reduction above needs more."""
     tried: list[Scene] = []
     findings.shrunk(HINGED, lambda smaller: not tried.append(smaller) and needs_b_and_gravity(smaller), 3)
     assert len(tried) == 3

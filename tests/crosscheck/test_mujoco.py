@@ -64,7 +64,7 @@ def test_mujoco_s_steps_divide_intervals_evenly_and_are_counted(family: str, eva
     assert (cost.steps, cost.rhs) == (6, 6 * evaluations)
 
 
-def test_implicitfast_is_offered_for_scenes_with_damping_alone() -> None:
+def test_implicitfast_is_offered_only_for_scenes_with_damping() -> None:
     """Without damping it takes the steps of Euler's method. The scene of every joint has a damper."""
     assert "implicitfast" not in {s.family for s in ENGINE.settings(SCENES["spatial_slider_crank"]())}
     assert "implicitfast" in {s.family for s in ENGINE.settings(every_joint())}
@@ -88,11 +88,13 @@ def test_integrated_accelerations_of_mujoco_stay_within_their_measured_error(nam
 
 def test_hardened_closures_are_closer_to_the_truth_than_stock_and_defaults() -> None:
     """On the spatial slider-crank at a step of 1e-5 s. By default closures return within 20 ms, in "stock"
-    within two steps, and in "tuned" they hardly open. Each is nearer to the truth: by 1000, then by 10."""
+    within two steps, and in "tuned" they hardly open. Errors from the judge's truth fall by a factor of over
+    1000 from "defaults" to "stock", and of over 10 from there to "tuned"."""
     scene = SCENES["spatial_slider_crank"]()
     options = {"defaults": {}, "stock": {}, "tuned": {"beta": 8000.0, "hard": HARD}}
     errors = {f: completed_error(simulate(scene, 0.02, f, step=1e-5, **o), scene) for f, o in options.items()}
-    assert errors["tuned"] < 1e-1 * errors["stock"] < 1e-4 * errors["defaults"], f"errors {errors}"
+    assert errors["stock"] < 1e-3 * errors["defaults"], f"errors {errors}"
+    assert errors["tuned"] < 1e-1 * errors["stock"], f"errors {errors}"
 
 
 @pytest.mark.parametrize(
@@ -131,16 +133,16 @@ def test_thin_disc_whose_rounded_inertia_violates_the_triangle_inequality_moves_
 
 
 def test_stiff_closures_cross_singular_positions_within_their_measured_error() -> None:
-    """The swinging four-bar is flat at 0.162, 0.664 and 0.989 s. The error from the judge's truth is at most
-    ten times the measured 4.5e-14 m or rad."""
+    """By the judge's truth the swinging four-bar is flat at 0.162, 0.664 and 0.989 s. The error from this
+    truth is at most ten times the measured 4.5e-14 m or rad."""
     scene = SCENES["four_bar_gravity"]()
     run = simulate(scene, 1.0, "stiff", step=2e-4, beta=1000.0, hard=HARD)
     assert completed_error(run, scene) < MARGIN * 4.5e-14
 
 
 def test_projected_mujoco_crosses_singular_positions_within_its_measured_error() -> None:
-    """The swinging four-bar is flat at 0.162, 0.664 and 0.989 s. At most ten times the measured: an error
-    from the judge's truth of 3.3e-9 m or rad, and joints violated by 4.4e-14 of the length."""
+    """The four-bar crosses the positions of the test above. At most ten times the measured values are
+    allowed: an error of 3.3e-9 m or rad from the judge's truth, joints violated by 4.4e-14 of the length."""
     scene = SCENES["four_bar_gravity"]()
     run = simulate(scene, 1.0, "projected", rtol=1e-8, min_step=4e-3, beta=40.0, hard=ADAPTIVE["projected"])
     assert completed_error(run, scene) < MARGIN * 3.3e-9

@@ -95,8 +95,8 @@ def case(way: str) -> tuple[Scene, Truth]:
 
 
 def error_over_limit(simulator: Engine, way: str) -> float:
-    """Return the error of poses over its limit in WAYS, or of velocities and reactions over a hundredfold
-    limit, whichever is largest; infinite for a run that does not complete."""
+    """Return the largest of three errors over the limit in WAYS: of poses, and hundredths of those of
+    velocities and of reactions. A run that does not complete has an infinite error."""
     scene, truth = case(way)
     setting, allowed = WAYS[way]
     run = simulator.run(scene, TIMES, setting)

@@ -77,8 +77,8 @@ def test_solvers_that_need_a_constraint_do_not_serve_a_free_body():
 @pytest.mark.slow
 @pytest.mark.parametrize(("family", "measured"), ERRORS.items())
 def test_newton_s_solver_moves_a_four_bar_within_its_measured_error(family, measured):
-    """Over 0.2 s at steps of 1 ms, by the judge's truth; 1.5 times the measured error (of the length) is
-    allowed."""
+    """Errors over 0.2 s, at steps of 1 ms, are from the judge's truth and over the length; 1.5 times the
+    measured one is allowed."""
     assert 0 < error_of_four_bar(family) < MARGIN * measured
 
 
@@ -110,8 +110,8 @@ def test_featherstone_does_not_close_the_loop():
 @pytest.mark.parametrize("name", ["spatial_slider_crank_gravity", "bennett", "flyball_governor"])
 def test_newton_s_kinematics_give_the_poses_and_velocities_at_the_start(name):
     """Newton's forward kinematics of the adapter's joint coordinates gives the poses of the adapter's bodies,
-    and its joint rates the judge's initial velocities. Limits are 1e-6 m and 1e-5 of the largest velocity:
-    roundings of single precision."""
+    and its joint rates the judge's initial velocities. Limits are 1e-6 m, and 1e-5 of 1 + the largest
+    velocity: roundings of single precision."""
     scene = SCENES[name]()
     mechanism = Mechanism(scene, spanning_tree(scene, JOINTS))
     state = mechanism.model.state()

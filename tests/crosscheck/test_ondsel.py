@@ -43,7 +43,7 @@ def test_ondsel_stays_within_its_measured_error_of_the_truth(name, measured, mea
     run = simulate(scene, np.linspace(0, scene.duration, 41), scene.duration / 400)
     truth = truth_for(scene).poses(run.times)
     assert completed_error(run, scene) < MARGIN * measured
-    # the size of what cancels in ω' of a steady crank
+    # a steady crank has ω' = 0, in which numbers of the size ω² cancel: the error is relative to them
     centripetal = {"angular_acceleration": abs(truth.angular_velocity).max() ** 2}
     for field in ("velocity", "angular_velocity", "acceleration", "angular_acceleration"):
         exact = getattr(truth, field)
@@ -183,8 +183,8 @@ def test_ondsel_gives_reactions_only_with_masses_and_without_loads() -> None:
 
 
 def test_driver_beyond_the_reach_ends_the_run_with_the_samples_before_the_failure() -> None:
-    """The slider starts at the end of its reach. OndselSolver gives a pose at 0.01 s, 5 mm beyond it, which
-    the judge measures as a violation of 0.05 of the length, and then fails."""
+    """The slider starts at the end of its reach. At 0.01 s, 5 mm beyond it, OndselSolver tilts the crank of
+    0.1 m by 0.05 rad, which the judge measures as a violation of the crank's hinge, and then fails."""
     base = SCENES["spatial_slider_crank"]()
     scene = base.with_(driver=(Driver(joint="D", polynomial=(0.0, 0.0, 50.0)),), load=())
     run = simulate(scene, np.linspace(0, 0.2, 21), 2e-3)

@@ -24,8 +24,8 @@ def nothing_more(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_optional_engines_without_their_packages_are_not_run_by_default(nothing_more: None) -> None:
-    """They stay known by name; a command that names no engine runs the built-in ones, and no notice names
-    them."""
+    """The optional engines stay known by name; a command that names no engine runs the built-in ones, and no
+    notice names them."""
     assert set(OPTIONAL) <= set(engine_names()), f"known: {engine_names()}"
     assert not any(map(installed, OPTIONAL)), f"installed: {[n for n in OPTIONAL if installed(n)]}"
     assert default_engines()[: len(BUILT_IN)] == BUILT_IN and not set(OPTIONAL) & set(default_engines())

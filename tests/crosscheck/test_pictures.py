@@ -23,9 +23,9 @@ def run():
 
 
 def test_runs_along_both_branches_part_at_the_crossing(run, tmp_path):
-    """The rhombus is flat at θ = -π, t = 1.5 π / 124.8 s: then the coupler either goes on parallel to the
-    ground (centre at twice the crank's centre + 0.25 m) or folds onto the crank. Poses are stored with six
-    digits of 0.75 m."""
+    """The second flat position of the rhombus is at θ = -π, t = 1.5 π / 124.8 s. From there the coupler goes
+    on parallel to the ground (centre at twice the crank's centre + 0.25 m), or folds onto the crank. Frames
+    begin halfway from the first flat position, at t = 0.5 π / 124.8 s. Poses have six digits of 0.75 m."""
     found = branches([run], tmp_path / "branches.jsonl")
     asked = [record["asked"]["options"] for record in found]
     assert asked == [{"rtol": 1e-9, BRANCHES: [[2, branch]]} for branch in (1, 2)]
@@ -77,8 +77,8 @@ def test_crossings_with_several_branches_are_shown_before_others():
 
 
 def test_run_takes_an_option_that_its_sweep_does_not_vary(capsys):
-    """The record of the command has option branches of taylor, by which a run takes branch 2 at the second
-    crossing; ``crosscheck run`` accepts options that settings of a sweep lack."""
+    """Option branches of taylor names the branch to take at a crossing; settings of a sweep have no such
+    option. ``crosscheck run`` accepts it, and its printed record repeats it: branch 2 at crossing 2."""
     asked = "run four_bar --engine mbref --setting taylor --option branches=[[2,2]] --times 0.05"
     assert main([*asked.split(), "--json"]) == 0
     assert '"branches": [[2, 2]]' in capsys.readouterr().out

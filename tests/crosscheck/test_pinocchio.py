@@ -58,8 +58,8 @@ def test_default_and_proximal_solver_agree_with_the_truth_without_redundancy() -
 
 
 def test_baumgarte_removes_most_of_the_drift_of_rk4() -> None:
-    """Errors from the judge's truth over 0.2 s, at steps of 0.15 ms: with feedback less than 0.3 of the error
-    without it ("proximal") is left."""
+    """Errors from the judge's truth over 0.2 s, at steps of 0.15 ms. With feedback ("baumgarte") less than
+    0.3 of the error without it ("proximal") is left."""
     scene = SCENES["planar_slider_crank"]()
     errors = {
         f: completed_error(simulate(scene, 0.2, f, step=1.5e-4), scene) for f in ("proximal", "baumgarte")
@@ -68,14 +68,14 @@ def test_baumgarte_removes_most_of_the_drift_of_rk4() -> None:
 
 
 def test_projection_keeps_the_branch_of_the_driven_four_bar() -> None:
-    """The rhombus is flat at 0.0126 and 0.0378 s. DOP853 with projection ("tuned") follows the closed form to
-    0.1 s, to 1e-13 m or rad; without it, the run goes on past the second time and ends before 0.1 s, not
-    finite."""
-    scene = SCENES["four_bar"]()
+    """The crank turns at 124.8 rad/s from θ = π/2, and the rhombus is flat at θ = 0 and -π. DOP853 with
+    projection ("tuned") follows the closed form to 0.1 s, to 1e-13 m or rad. Without it, the run passes the
+    second flat position and ends before 0.1 s, not finite."""
+    scene, second = SCENES["four_bar"](), 1.5 * np.pi / 124.8  # s
     options = {"rtol": 1e-8, "min_step": 2e-4}
     plain, projected = (simulate(scene, 0.1, family, **options) for family in ("dop853", "tuned"))
     assert completed_error(projected, scene) < MARGIN * ROUNDING
-    assert plain.outcome is Outcome.NOT_FINITE and plain.t_end > 0.0378, plain.message
+    assert plain.outcome is Outcome.NOT_FINITE and plain.t_end > second, plain.message
 
 
 def test_pinocchio_follows_a_driver_exactly_at_a_loose_tolerance() -> None:

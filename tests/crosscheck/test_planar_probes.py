@@ -29,8 +29,8 @@ def loops(scene: Scene) -> int:
 
 
 def test_planar_engine_is_run_on_at_least_twenty_loops():
-    """Specimens that an engine of hinges along z and slides can run, and that have more joints than bodies:
-    the planar probes, added for such an engine, are the most."""
+    """Specimens that an engine of hinges along z and slides can run, and that have more joints than bodies.
+    Without the planar probes, which are added for such an engine, too few would test its loops."""
     scenes = [specimen.scene for specimen in find_specimens(None, 0.0, ENGINE)]
     able = [s for s in scenes if PLANAR.cannot(s) is None and loops(s) > 0]
     assert len(able) >= 20 and len({s.name for s in scenes}) == len(scenes), [s.name for s in able]

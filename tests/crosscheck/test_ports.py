@@ -29,7 +29,8 @@ GRAVITY = (1.0, -8.0, -5.0)  # m/s²
 
 @pytest.mark.parametrize("name", PORTS)
 def test_mujoco_s_ports_refuse_drivers(name: str) -> None:
-    """They lack MuJoCo's callback, by which its adapter drives; the four-bar without a driver is accepted."""
+    """The ports lack MuJoCo's callback, by which its adapter drives; the four-bar without a driver is
+    accepted."""
     refusal = engine(name).cannot(SCENES["four_bar"]())
     assert refusal is not None and refusal.owner is Owner.ENGINE and "callback" in refusal.reason, refusal
     assert engine(name).cannot(SCENES["four_bar_gravity"]()) is None
@@ -43,7 +44,7 @@ def test_warp_sweeps_the_finest_step_only_with_loops_or_couplings() -> None:
             of_mjx, of_warp = (
                 [s.options["step"] for s in engine(n).settings(scene) if s.family == family] for n in PORTS
             )
-            assert of_warp == of_mjx[: len(of_mjx) - omitted] != [], family
+            assert of_warp and of_warp == of_mjx[: len(of_mjx) - omitted], family
 
 
 @pytest.mark.slow
@@ -85,8 +86,8 @@ def test_single_and_double_precision_differ_by_rounding(name: str, mechanism: st
         engine(simulator).run(scene, times, Setting(family, {"step": 1e-3}))
         for simulator, family in ((name, "stock"), SINGLE[name])
     ]
-    apart = float(error_series(scene, *runs).max())
-    assert 1e-9 < apart < MARGIN * APART[mechanism][name], f"{apart:.1e} apart"
+    difference = float(error_series(scene, *runs).max())
+    assert 1e-9 < difference < MARGIN * APART[mechanism][name], f"{difference:.1e} apart"
 
 
 def bare(scene: Scene) -> Scene:

@@ -18,7 +18,8 @@ ROOT = Path(__file__).parents[2]
 def held(
     place: Path, chosen: str, *options: str, name: str = "spatial_engine:ENGINE", path: str | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """pytest on the suite in an empty directory, the example engine in this place."""
+    """Run pytest with the plug-in in the folder ``place`` on the suite's tests ``chosen`` by -k, for the
+    engine ``name``. With ``path`` as PYTHONPATH the engine runs in child processes."""
     plugin = ["-p", "crosscheck.conformance.pytest_plugin", "-p", "cacheprovider", "-o", "addopts="]
     named = ["--pyargs", "crosscheck.conformance", "--engine", name, "-k", chosen]
     named += [] if path else ["--in-process"]

@@ -112,8 +112,9 @@ def test_reactions_that_hinges_share_are_listed_by_joint_and_run():
     assert found["A"] == pytest.approx({"one": 3.0, "other": 1.0})
 
 
-def test_hinges_that_share_a_force_otherwise_have_equal_unique_reactions():
-    """Shares of A differ by 2 N of the largest force, 7 N; C's reaction and the resultants are equal."""
+def test_runs_that_divide_a_shared_force_differently_have_equal_unique_reactions():
+    """Hinges A and B share 4 N: A has 3 N in one run and 1 N in the other, a difference of 2 N of the largest
+    force, 7 N. C's reaction and the resultants are equal."""
     compared = compare(LEAVES, ONE, OTHER)
     assert compared.joints["C"].shared == 0 and compared.joints["C"].unique == 0.0
     assert compared.joints["A"].chosen == pytest.approx(2 / 7) and compared.resultant == pytest.approx(0.0)

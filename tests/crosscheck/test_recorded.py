@@ -105,9 +105,9 @@ def test_column_is_right_within_the_tolerance_of_its_scale(table, tolerance, rig
 @pytest.mark.slow  # references of changed scenes, which take seconds
 @pytest.mark.parametrize(("scene", "plant", "says"), PLANTED.values(), ids=PLANTED)
 def test_planted_difference_is_the_first_explanation(scene, plant, says, table):
-    """The recorded motion is of a changed scene, with damping in a joint or another mass of a body. With the
-    change that the sentence names, less than 1e-3 of the difference between recorded motion and reference
-    remains."""
+    """The recorded motion is of a changed scene: damping in a joint, a mass times 0.9, or a mass times 1e-3,
+    which is reported as no mass. With the change that the sentence names, less than 1e-3 of the difference
+    between recorded motion and reference remains."""
     found = judge_motion(scene, plant(table))
     assert not found.is_right
     assert found.explanations[0].sentence.startswith(says), found.explanations
@@ -174,7 +174,8 @@ def test_tables_in_other_units_and_orders_are_judged_right(table, tmp_path):
     ],
 )
 def test_faulty_table_is_refused_with_its_fault(text, columns, says, tmp_path):
-    """The table's text, the columns of the request, and a part of the error."""
+    """A time of 800 s, a name with a slip, a column that is not there, and two wrong units: a part of the
+    error names each."""
     (tmp_path / "faulty.csv").write_text(text)
     with pytest.raises(SceneError, match=says):
         read(tmp_path / "faulty.csv", SCENE, columns)
@@ -197,8 +198,9 @@ def test_judge_command_ends_with_status_2_for_what_it_cannot_read(tmp_path):
     """A tolerance that is negative or no number, a column without a number, a file that does not exist."""
     SCENE.save(tmp_path / "s.toml")
     (tmp_path / "t.csv").write_text("time,upper.x\n0,1\n")
-    judge, scene = ["judge", str(tmp_path / "s.toml")], str(tmp_path / "t.csv")
+    judge, motion = ["judge", str(tmp_path / "s.toml")], str(tmp_path / "t.csv")
     for wrong in ("-1", "x"):
         with pytest.raises(SystemExit, match="2"):
-            main([*judge, scene, "--tolerance", wrong])
-    assert main([*judge, str(tmp_path / "none.csv")]) == main([*judge, scene, "--column", "upper"]) == 2
+            main([*judge, motion, "--tolerance", wrong])
+    assert main([*judge, motion, "--column", "upper"]) == 2
+    assert main([*judge, str(tmp_path / "none.csv")]) == 2

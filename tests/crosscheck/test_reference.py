@@ -67,9 +67,9 @@ def errors(scene: Scene, found: Reference, exact: Trajectory) -> np.ndarray:
 
 
 def test_bound_of_a_mechanism_far_from_the_origin_holds_the_rounding_of_its_samples():
-    """A pendulum 1e6 m from the origin: rounded to doubles, its samples lose up to 1e-10 of its length, here
-    more than 1e-12. One motion stands for all runs of the reference, so that they do not differ: the bound
-    covers the loss alone, and is below 1e-9."""
+    """A pendulum of 1 m is 1e6 m from the origin: samples rounded to doubles lose up to 1e-10 of its length,
+    here more than 1e-12. The same motion is passed as all three runs of the reference, which then do not
+    differ. The bound covers the loss alone, and is below 1e-9."""
     scene, _ = pendulum()
     far = Isometry(np.eye(3), np.array([1e6, 0.0, 0.0])).change(scene)
     motion = natural_motion(far, [0.0, 0.4, 0.8], EXTENDED, seconds=SECONDS)
@@ -111,8 +111,8 @@ def test_reference_with_contradicting_joints_is_within_its_bound_of_the_exact_mo
 
 
 def test_tree_formulation_passes_the_flat_linkage_of_bennett_in_few_panels():
-    """One of two rows that close Bennett's linkage vanishes where it is flat; a solver that keeps this row
-    needs many short panels in 1 s, and one that changes rows fewer than 10."""
+    """One of two rows that close Bennett's linkage vanishes where it is flat. A solver that keeps this row
+    needs many short panels for 1 s; a solver that changes to the other row needs fewer than 10."""
     motion = tree_motion(SCENES["bennett"](), np.linspace(0.0, 1.0, 3), EXTENDED, seconds=SECONDS)
     assert not motion.reason and motion.steps < 10
 

@@ -126,7 +126,7 @@ def test_error_of_1e_4_in_a_mass_or_armature_shows_in_the_motion():
 
 
 def random_file_moves_alike(make, seed: int, folder: Path) -> bool:
-    """Whether a random file is read, with its couplings; its motion then is the original's."""
+    """Return whether a random file is read; if so, its motion is the original's, with its couplings."""
     file = make(seed)
     path = folder / f"random{file.suffix}"
     path.write_text(file.text)
@@ -148,5 +148,6 @@ MAKERS = (random_models.mjcf, random_models.urdf)
 )
 @pytest.mark.parametrize("make", MAKERS, ids=["mjcf", "urdf"])
 def test_scenes_of_random_files_move_as_mujoco_s_models(make, seeds, least, tmp_path):
-    """A ``least`` number of the files is read; the others are refused for a known reason."""
+    """At least ``least`` files are read, and the scenes move as MuJoCo's models to SAME, 1e-9; the others are
+    refused for a reason in REFUSALS."""
     assert sum(random_file_moves_alike(make, seed, tmp_path) for seed in seeds) >= least

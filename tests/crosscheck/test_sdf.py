@@ -230,7 +230,8 @@ def test_keyframe_of_an_sdf_file_is_refused(tmp_path):
 
 
 def test_joint_of_the_world_connects_two_models_in_a_world_frame(tmp_path):
-    """Models p and q are 1 m and 2 m off frame f along x, which is 5 m off the world along y."""
+    """Frame f is 5 m along y; models p and q are 1 m and 2 m from it along x. Each has a link a, 1 m above
+    the model, with its centre 0.1 m along x. The hinge joins both links at the link of q."""
     link = LINK.format(name="a", pose="0 0 1 0 0 0", centre="0.1 0 0")
     models = [
         f'<model name="{m}"><pose relative_to="f">{x} 0 0 0 0 0</pose>{link}</model>'

@@ -48,7 +48,7 @@ def test_sdf_path_finds_an_included_model_with_its_own_pose(tmp_path, monkeypatc
 
 
 def test_included_sun_and_ground_plane_are_left_out(tmp_path):
-    """These models of Gazebo's library have no moving link and need not be on the disk."""
+    """Both models, of Gazebo's library, have no moving link and need not be on the disk."""
     still = "".join(f"<include><uri>{uri}</uri></include>" for uri in ("model://sun", "model://ground_plane"))
     text = pair().replace("<model", f'<world name="w">{still}<model').replace("</sdf>", "</world></sdf>")
     assert [body.name for body in read(tmp_path, text).scene.body] == ["a", "b"]
@@ -73,10 +73,11 @@ def gears(parent: str = "one", child: str = "two", sense: int = 1, swapped: bool
 @pytest.mark.parametrize("swapped", [False, True])
 @pytest.mark.parametrize("sense", [1, -1])
 def test_gearbox_turns_its_child_by_minus_ratio_times_the_parent(sense, swapped, tmp_path):
-    """About its axis2 the child turns at -3 times the parent's rate about its axis, whatever the senses of
-    the hinges are; accelerations from rest by Gauss's principle."""
+    """SDF defines θ₂ = -ratio · θ₁: θ₁ is the angle from the reference body to the parent about ``axis``, and
+    θ₂ to the child about ``axis2``, whatever the senses of the hinges are. From rest angular accelerations by
+    Gauss's principle have the same ratio, here -3."""
     scene = read(tmp_path, gears(sense=sense, swapped=swapped)).scene
-    spins = gauss(scene)[len(scene.body) :, 1]
+    spins = gauss(scene)[len(scene.body) :, 1]  # about y, of the frame and both wheels
     of_parent, of_child = spins[1] - spins[0], sense * (spins[2] - spins[0])
     assert abs(of_parent) > 1 and of_child == pytest.approx(-3 * of_parent, rel=1e-9)
 

@@ -47,7 +47,7 @@ def test_simbody_stays_within_its_measured_error_of_the_truth(name, duration, me
 @pytest.mark.parametrize("family", FAMILIES)
 def test_accuracy_of_a_hundredth_reduces_simbody_s_error_fivefold(family: str) -> None:
     """Errors from the judge's truth at accuracies of 1e-4, 1e-6 and 1e-8; an accuracy that had no effect
-    would leave the error. Five is half of a tenfold, which the order of the methods gives."""
+    would leave the error, and one to which the error is proportional would reduce it a hundredfold."""
     scene = SCENES["spatial_slider_crank"]()
     errors = [
         completed_error(simulate(scene, 0.02, accuracy, family), scene) for accuracy in (1e-4, 1e-6, 1e-8)
@@ -61,8 +61,9 @@ def prescribed(*drivers: Driver) -> Scene:
 
 
 def test_simbody_follows_polynomial_and_sine_drivers() -> None:
-    """t - 2 t² + 3 t³ (rad) of a cylinder, 0.05 (sin(7 t + 0.4) - sin 0.4) (m) of a slide, to ten times the
-    measured 1.6e-13. Accelerations are Pinocchio's to ten times the measured 8.1e-9 m/s²."""
+    """Drivers prescribe t - 2 t² + 3 t³ (rad) of a cylinder and 0.05 (sin(7 t + 0.4) - sin 0.4) (m) of a
+    slide, which are met to ten times the measured 1.6e-13. Accelerations are Pinocchio's to ten times the
+    measured 8.1e-9 m/s²."""
     pytest.importorskip("pinocchio")
     wave = Sine(amplitude=0.05, frequency=7.0, phase=0.4)
     slide = Driver(joint="tra", polynomial=(-0.05 * np.sin(0.4),), sine=wave)

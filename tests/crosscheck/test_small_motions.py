@@ -39,9 +39,9 @@ def judged(request):
 
 
 def test_judge_finds_the_eigenvalues_of_closed_forms(judged):
-    """Each closed form of the mechanism (`known`) is met by a pose found, relative to its largest eigenvalue:
-    to 1e-13, and to fifty times the uncertainty that the judge states, below 1e-11. A positive real part is
-    called unstable."""
+    """For each closed form of the mechanism (`known`) a pose is found whose eigenvalues differ by less than
+    1e-13 of the largest, and by at most fifty times the uncertainty that the judge states, which is below
+    1e-11. A positive real part is called unstable."""
     mechanism, found = judged
     for exact in mechanism.known():
         errors = [error(each.eigenvalues, np.array(exact)) for each in found]

@@ -108,7 +108,7 @@ def everywhere() -> list[Case]:
 
 
 def test_process_pool_gives_the_records_of_a_serial_study(one_after_the_other: list[dict]):
-    """Except for times and seconds; one of the three cases crashes."""
+    """Records are equal except for times and seconds; one of the three cases crashes."""
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         records = study(everywhere(), pool)
     assert untimed(records) == untimed(one_after_the_other)
@@ -116,7 +116,8 @@ def test_process_pool_gives_the_records_of_a_serial_study(one_after_the_other: l
 
 
 def test_run_in_a_child_gives_the_record_of_a_run_here():
-    """Except for times, and for mbref's estimate of its error, which only the child of a study makes."""
+    """Records are equal except for times, and for mbref's estimate of its error, which only the child of a
+    study makes."""
     wanted = Case(SCENES["four_bar"](), TIMES, "mbref", Setting("mpi-svd+projection", {"rtol": 1e-6}))
     here, child = untimed([run_here(wanted)]), untimed([run_case(wanted)])
     assert here[0].pop("error_estimate") is None and child[0].pop("error_estimate")["largest"] > 0

@@ -39,8 +39,8 @@ def test_ida_stays_within_its_measured_error_of_the_truth(name, duration, measur
 
 
 def test_ida_lets_a_body_without_joints_fall_as_the_closed_form() -> None:
-    """Its centre moves by v t + g t² / 2 and it turns steadily. The error is at most ten times the measured
-    1.9e-7 m or rad."""
+    """The body's centre moves by v t + g t² / 2, and the body turns steadily. The error is at most ten times
+    the measured 1.9e-7 m or rad."""
     scene, _ = free_fall()
     assert completed_error(simulate(scene, 0.5, 1e-8), scene) < MARGIN * 1.9e-7
 

@@ -49,9 +49,9 @@ STARTS = {"mujoco": 5.2e-11, "pinocchio": ROUNDING, "exudyn": 1.7e-8}  # measure
 
 @pytest.mark.parametrize("name", STARTS)
 def test_every_feature_that_an_engine_does_not_refuse_starts_by_gauss_s_principle(name):
-    """Its run completes a hundredth of the probe's time. Accelerations at the start differ from the
-    principle's by at most ten times STARTS, 1e-14 to 1.7e-8 of the largest and at least 1 m/s². Exudyn
-    reports none with drivers, and the principle needs masses: at least 20 probes remain."""
+    """A run of each such probe completes a hundredth of the probe's time. Accelerations at the start differ
+    from the principle's by at most ten times STARTS, 1e-14 to 1.7e-8 of the largest and at least 1 m/s².
+    Exudyn reports none with drivers, and the principle needs masses: at least 20 probes remain."""
     simulator, judged = engine(name), []
     for feature, scene in feature_scenes().items():
         if simulator.cannot(scene) is None:

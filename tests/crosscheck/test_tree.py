@@ -28,14 +28,15 @@ def test_tree_formulation_crosses_singular_positions_on_the_smooth_branch(name):
 
 
 def test_tree_formulation_crosses_the_dead_positions_of_equal_crank_and_rod():
-    """Picard's iteration converges on no panel across these positions; the truth is the closed form, to 1e-12
-    m, whose crank is upright at 0.061192 s and 0.120704 s."""
+    """Crank and rod of 0.308 m lie on each other where the crank is upright. In 0.14 s it turns to θ = π/2
+    and on to 3π/2: at both times that formulation B reports, the closed form has the crank's centre 0.154 m
+    above and below its pivot. The motion is the closed form to 1e-12 m."""
     scene, times = SCENES["planar_slider_crank_equal"](), np.linspace(0.0, 0.14, 8)
-    motion, exact = tree_motion(scene, times, EXTENDED, seconds=SECONDS), closed_form(scene).poses(times)
+    motion, truth = tree_motion(scene, times, EXTENDED, seconds=SECONDS), closed_form(scene)
     assert not motion.reason
-    assert motion.crossings == pytest.approx((0.061192, 0.120704), abs=3e-6)  # s
-    off = np.abs(doubles(motion.position) - exact.position).max()
-    assert 0 < off < 1e-11 / 10, f"off by {off:.1e} m"
+    centres = truth.poses(np.array(motion.crossings)).position[:, 0]
+    assert centres == pytest.approx(np.array([[0.0, 0.154, 0.0], [0.0, -0.154, 0.0]]), abs=1e-9)
+    assert np.abs(doubles(motion.position) - truth.poses(times).position).max() < 1e-12
 
 
 def test_tree_formulation_refuses_a_singular_start():

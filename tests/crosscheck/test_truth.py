@@ -1,4 +1,4 @@
-"""The judge's truths / textbook formulas, quadrature, published numbers and conserved quantities."""
+"""The judge's truths / textbook formulas, quadrature and conserved quantities."""
 
 import itertools
 import math
@@ -41,16 +41,6 @@ def test_coupler_of_a_driven_rhombus_moves_on_a_circle_without_turning(scene, st
     motion = truth_for(scene).poses(t)
     assert np.abs(motion.position[:, 1] - coupler).max() < ROUNDED
     assert rotations.angle_between(motion.orientation[:, 1], np.array([1.0, 0, 0, 0])).max() < ROUNDED
-
-
-def test_four_bar_chain_has_the_published_position_and_velocity():
-    """The top of the first upright (m, m/s) at 10 s, by a published finite-element code of second order. Its
-    step of 1.25e-4 s leaves errors of some 1e-6, below the limit of 4e-6."""
-    published = {"position": (0.3284573768, 0.9445187937), "velocity": (1.423050003, -0.4948670827)}
-    found = truth_for(SCENES["four_bar_chain"]()).poses(np.array([10.0]))
-    for name, value in published.items():
-        ours = 2 * getattr(found, name)[0, 0, :2]
-        assert np.abs(ours - value).max() < 4e-6, f"{name} {ours}, published {value}"
 
 
 def test_driven_spatial_slider_follows_the_paper_s_formula():

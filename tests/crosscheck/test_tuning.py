@@ -143,13 +143,13 @@ def test_family_that_timed_out_is_abandoned():
     assert not found(engine, 1e-9, 0.1, 0.01) and len(engine.asked) == 1, engine.asked
 
 
-@pytest.mark.parametrize(("bound", "found"), [(2e-9, 0), (1e-11, 1)])
-def test_no_setting_reaches_an_error_below_the_truth_s_bound(bound, found):
+@pytest.mark.parametrize(("bound", "settings"), [(2e-9, 0), (1e-11, 1)])
+def test_no_setting_reaches_an_error_below_the_truth_s_bound(bound, settings):
     """A truth known to 2e-9 cannot show an error below 1e-10, so that no setting is found; one known to 1e-11
     can. Runs have errors of 1e-15."""
     known = {"metrics": {"error": 1e-15, "error_bound": bound}}
     engine = Modelled(lambda record: record | known, f=Family(order=4.0))
-    assert len(tuned(engine.cases(0.001, 0.0005), 1e-10, engine).reached) == found
+    assert len(tuned(engine.cases(0.001, 0.0005), 1e-10, engine).reached) == settings
 
 
 def test_steps_are_limited_by_the_longest_interval_between_samples():
