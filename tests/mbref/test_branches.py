@@ -111,8 +111,9 @@ def test_branches_that_are_not_positive_whole_numbers_are_refused(wrong):
     ],
 )
 def test_command_names_the_option_that_asks_for_an_impossible_branch_or_code(words, message, capsys):
-    """Released at 0.1 rad, the rhombus is flat first at 0.162337 s, where it has two branches. The method
-    `lm1` crosses no singular position and has no generated code."""
+    """The words begin with the duration (s). By the judge's closed form the swinging rhombus is flat first at
+    0.162337 s, where it has two branches, and next after 0.5 s. The method `lm1` crosses no singular position
+    and has no generated code."""
     assert main(["run", "four_bar_gravity", "--duration", *words.split()]) == 2
     said = capsys.readouterr().err
     assert said.startswith(message) and said.count("\n") == 1, said

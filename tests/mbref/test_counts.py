@@ -56,8 +56,9 @@ def test_rank_of_the_four_bar_is_one_less_at_its_straight_pose():
 
 
 def test_diagnosis_counts_the_rows_that_share_a_redundant_force():
-    """A force along z through the slider's pin needs a force at A, B, C and D, and a moment at the hinges A
-    and B, which are not on its line: 2, 2, 1 and 1 rows, and no unique reaction."""
+    """One row is redundant: a force along z on the line through the slider's pin can act in all joints. At C
+    and D, on this line, it is one component; at the hinges A and B, off the line, it is a force and a moment.
+    So no joint has a unique reaction."""
     found = diagnose(SCENES["planar_slider_crank"]())
     assert found.counts.redundant == 1
     assert found.redundant_by_joint == {"A": 2, "B": 2, "C": 1, "D": 1}

@@ -89,9 +89,9 @@ def test_another_process_reports_all_faults_of_a_scene():
 
 
 def test_random_numbers_of_variants_have_the_requested_distributions():
-    """Of 400 scenes: the mean of place B is 0.1 m within 4 standard errors, 4 σ / √400, its deviation σ = 1
-    mm within 15 %. Masses are uniform in 0.9 to 1.1 kg, and come within 0.01 kg of both ends. The correlation
-    is below 0.2."""
+    """400 scenes are drawn: the mean of place B is 0.1 m within 4 standard errors, 4 σ / √400, its deviation
+    σ = 1 mm within 15 %. Masses are uniform in 0.9 to 1.1 kg, and come within 0.01 kg of both ends. The
+    correlation is below 0.2."""
     scenes = list(variants(DRIVEN, VARY, 400, seed=3))
     x = np.array([scene.joint[1].anchor[0] for scene in scenes])
     mass = np.array([scene.body[2].mass for scene in scenes])

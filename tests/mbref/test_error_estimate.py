@@ -109,8 +109,9 @@ def test_estimate_is_the_true_error_of_an_oscillation(oscillator):
 
 
 def test_message_warns_of_a_sensitive_motion_and_states_the_error_at_a_tighter_tolerance(pendulums):
-    """A chaotic triple pendulum: with rtol 1e-4 the error exceeds 0.1, the tighter tolerance 1e-12 has less
-    than a hundredth of it, which is, to a factor of ten, the estimate of a run with this tolerance."""
+    """A chaotic triple pendulum: with rtol 1e-4 the error exceeds 0.1. The error that the estimate states for
+    the tighter tolerance 1e-12 is less than a hundredth of this. A run with rtol 1e-12 has an estimate of the
+    same size, to a factor of ten."""
     motion = simulate(pendulums, "taylor", rtol=1e-4)
     warned = with_error_estimate(motion)
     found = warned.error_estimate
@@ -134,9 +135,8 @@ def test_estimate_at_the_smallest_tolerance_shows_the_growth_of_rounding_errors(
     ids=["passes singular positions", "driven, begins at a singular position"],
 )
 def test_motion_at_a_singular_position_has_its_true_error_as_its_estimate(name, duration):
-    """The judge has the true motion of one degree of freedom. Estimates are within 20 % of its errors: 2 %
-    are found for the passing motion, which is off by 4e-10. The driven one has errors of rounding alone, and
-    so its estimate."""
+    """Errors are those from the judge's closed form. The passing motion is off by 4e-10, and its estimate by
+    less than 20 % of this (2 % are found). Error and estimate of the driven motion are rounding alone."""
     rounding = 1e-12  # of the length, or rad; the driven motion has an estimate of 1e-13
     motion = with_error_estimate(simulate(name, duration=duration))
     found, true = motion.error_estimate, relative_error(motion, SCENES[name]())

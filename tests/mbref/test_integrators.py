@@ -72,8 +72,8 @@ def test_dop853_converges_with_order_eight(error, longest):
 @pytest.mark.parametrize("order", [1, 2, 4, 6, 8])
 @pytest.mark.parametrize("error", [oscillator_error, pendulum_error])
 def test_adams_of_a_largest_order_converges_with_one_order_more(error, order):
-    """With local extrapolation, order k converges like order k + 1 in the number of steps, here to a fifth:
-    the order varies in the first steps of a run."""
+    """With local extrapolation, order k converges like order k + 1 in the number of steps, to a fifth of
+    this: the order varies in the first steps of a run."""
     runs = [
         error(f"lm1+none/adams[max_order={order}]", np.array([0.0, 5.0]), rtol=rtol)
         for rtol in 10.0 ** -np.arange(4, 7 + min(order, 4), 0.5)

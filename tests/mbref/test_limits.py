@@ -20,8 +20,9 @@ WRONG = (-1.0, math.nan, math.inf, 5e-324, 10**400, "1", True, [1.0])
     ids=repr,
 )
 def test_limit_that_is_no_finite_number_in_its_interval_is_refused_by_name(name, value):
-    """NUMBERS are the tolerances and lengths of steps. WRONG has negative, infinite, missing, denormal and
-    endless numbers, a text, a truth value and a list. A tolerance of 0 and an rtol of 1 are refused, too."""
+    """NUMBERS are the tolerances and lengths of steps. WRONG has a negative number, NaN, infinity, a denormal
+    number, an integer above all floats, a text, a truth value and a list. Tolerances of 0 and an rtol of 1
+    are refused, too."""
     with pytest.raises(ValueError, match=f"^{name}: must be "):
         Limits(**{name: value})
 
@@ -30,7 +31,7 @@ def test_limit_that_is_no_finite_number_in_its_interval_is_refused_by_name(name,
 def test_step_limit_of_zero_which_means_no_limit_is_accepted(name):
     """STEPS are the limits of the length and turn of a step. A whole number, 0, is stored as the float
     0.0."""
-    assert getattr(Limits(**{name: 0}), name) == 0.0
+    assert repr(getattr(Limits(**{name: 0}), name)) == "0.0"
 
 
 @pytest.mark.parametrize("value", [0, -1, 1.5, 100.0, 2**63, True, "9", None], ids=repr)

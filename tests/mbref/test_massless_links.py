@@ -82,8 +82,8 @@ def test_mass_of_zero_with_an_inertia_is_refused():
 
 
 def test_body_whose_centre_is_off_its_anchor_by_rounding_slides_at_its_speed():
-    """It slides at 1 m/s. Errors of a step are relative to the mechanism's length, which must not be the
-    1e-16 m between centre and anchor, where no step would succeed."""
+    """The body slides at 1 m/s. Errors of a step are relative to the mechanism's length, which must not be
+    the 1e-16 m between centre and anchor, where no step would succeed."""
     slide = Translational(name="x", bodies=("ground", "load"), anchor=(0.45, -0.05, -0.275), axis=X)
     load = LOAD.model_copy(update={"position": (0.45000000000000007, -0.05, -0.275), "velocity": X})
     motion = simulate(Scene(name="s", body=(load,), joint=(slide,)), times=TIMES)

@@ -84,7 +84,7 @@ FAULTS = {"t_end": "soon", "angles": {"A": [0.0]}, "cost": {"steps": "3"}, "bodi
 
 @pytest.mark.parametrize("field", [None, *FAULTS])
 def test_file_that_is_no_saved_motion_is_refused(field, crank, tmp_path):
-    """It has no record (None), or a record in which one field has a value of another kind or length
+    """The file has no record (None), or a record in which one field has a value of another kind or length
     (FAULTS)."""
     whole = {"scene": crank.mechanism.to_dict(), "record": {**crank.to_record(), field: FAULTS.get(field)}}
     (tmp_path / "other.json").write_text(json.dumps(whole if field else {"scene": 1}))

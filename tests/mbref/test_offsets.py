@@ -46,7 +46,7 @@ def error(found: np.ndarray, exact: np.ndarray) -> float:
 
 
 # maker, coupling, offset, ratio r; end (s); inertias J of the first and m of the second coordinate, and the
-# constant acceleration of the first: M / J', -m g r / J' and the nut's fall m g h / J', J' = J + r² m
+# constant force on the first: a torque, or the weight of rack or nut times -r
 STARTS = {
     "gear pair": (gear_pair, "teeth", 0.4, -0.5, 2.0, 0.03, 0.2, 2.0),
     "rack": (rack, "teeth", 0.003, 0.05, 1.0, 0.2, 1.5, -1.5 * G * 0.05),
@@ -58,8 +58,8 @@ STARTS = {
 @pytest.mark.parametrize("of", STARTS)
 def test_coupled_coordinates_start_by_the_least_displacement_and_move_from_there(of, method):
     """The least J a² + m b² with b = c + r a, c the offset, has a = -r m c / J' and b = J c / J', to 0.5 %
-    (STEPS), as it is found in finite steps. From there a torque or a weight moves them with the constant
-    acceleration that STARTS gives, to rounding (CLOSED_FORM). METHODS are Taylor series and a formulation."""
+    (STEPS), as it is found in finite steps. From there the force in STARTS moves a with the constant
+    acceleration force / J', J' = J + r² m, to rounding (CLOSED_FORM), by two methods."""
     make, name, offset, ratio, end, first, second, force = STARTS[of]
     times, inertia = np.linspace(0, end, 11), first + ratio**2 * second
     motion = mbref.simulate(shifted(make, name, offset), method=method, times=times, rtol=1e-13)
@@ -73,9 +73,9 @@ def test_coupled_coordinates_start_by_the_least_displacement_and_move_from_there
 
 @every
 def test_assembled_scene_has_no_offset_and_moves_as_the_scene_with_offset(make, name, offset):
-    """It satisfies the joints to rounding (CLOSED_FORM), has the counts of the scene without offset, and is
-    its own assembly. A run of the scene with offset begins at this pose, so that both motions are equal to
-    the bit."""
+    """The assembled scene satisfies its joints to rounding (CLOSED_FORM), has the counts of the scene without
+    offset, and is its own assembly. A run of the scene with offset begins at this pose, so that both motions
+    are equal to the bit."""
     scene = shifted(make, name, offset)
     found = mbref.assembled(scene)
     assert mbref.assembled(found) is found and mbref.counts(found) == mbref.counts(make())

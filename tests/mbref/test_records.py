@@ -87,8 +87,8 @@ def test_command_refuses_a_file_for_results_that_holds_none_or_cannot_be_written
     few = "--vary gravity[1]=0:1 --count 2 --workers 1 --samples 2 --duration 1e-3"
     try:
         status = main(["ensemble", "four_bar", *few.split(), "--out", out])
-    except SystemExit as refused:
-        status = refused.code
+    except SystemExit as ended:
+        status = ended.code
     error = capsys.readouterr().err
     assert status == 2 and says in error and "Traceback" not in error, error
     assert Path("letter.txt").read_text() == "my only copy"

@@ -107,8 +107,9 @@ def test_fault_found_by_a_run_states_the_line_of_its_entry(tmp_path, capsys):
         ([], "mbref diagnose my.toml"),
     ],
 )
-def test_wrong_command_line_is_answered_with_a_suggestion(capsys, words, says):
-    """The program ends with status 2; without words it lists commands."""
+def test_wrong_or_empty_command_line_ends_with_status_2_and_says_what_to_type(capsys, words, says):
+    """A misspelt word is answered with the nearest known one, a number with a unit with its fault, and no
+    words with examples of commands."""
     with pytest.raises(SystemExit) as ended:
         main(words)
     assert ended.value.code == 2 and says in capsys.readouterr().err
@@ -311,9 +312,9 @@ def test_command_assemble_refuses_a_pair_of_joints_with_two_meanings(tmp_path, c
     assert "may be the joints 'A' and 'B-C' or 'A-B' and 'C'" in capsys.readouterr().err
 
 
-def test_command_assemble_names_moved_joints_of_a_linkage_of_a_micrometre(tmp_path, capsys):
-    """Its crank becomes longer by a ten-millionth of its length; joint B moves by 1e-13 m or less, which is
-    not rounding here."""
+def test_command_assemble_names_moved_joints_of_a_linkage_of_half_a_micrometre(tmp_path, capsys):
+    """The crank of 0.5 µm becomes longer by 1e-13 m, 2e-7 of its length. Joint B moves by about this, which
+    is reported, as rounding of 0.5 µm is 1e-22 m."""
     path = tmp_path / "small.toml"
     in_other_units(pinned_four_bar(), 1e-6, 1.0).save(path)
     assert main(["assemble", str(path), "--length=A-B=0.5000001e-6"]) == 0
@@ -329,7 +330,7 @@ def pinned_four_bar() -> Scene:
 
 
 def test_diagnose_reports_that_a_loop_with_a_tilted_hinge_is_locked(tmp_path, capsys):
-    """Three parallel hinges and one tilted by 0.1 allow no motion."""
+    """Three parallel hinges and one whose axis (0, 0.1, 1) is tilted allow no motion."""
     pinned_four_bar().with_("joint[A].axis", [0.0, 0.1, 1.0]).save(tmp_path / "locked.toml")
     assert main(["diagnose", str(tmp_path / "locked.toml")]) == 0
     out = capsys.readouterr().out
@@ -371,8 +372,9 @@ def test_command_run_refuses_a_file_with_another_ending(tmp_path, capsys):
 
 
 def test_command_animate_draws_the_branches_of_a_crossing_side_by_side(tmp_path, monkeypatch):
-    """The rhombus has two branches at 3/2 π / (124.8 rad/s): the picture has a panel for each. The five-bar
-    has one branch at its first crossing, and one panel."""
+    """In 0.05 s the driven rhombus is flat twice, and has two branches at the second position: the picture of
+    the branches has a panel for each. The picture of the five-bar's first crossing, which has one branch, has
+    no second panel."""
     monkeypatch.chdir(tmp_path)
     assert main(["animate", "four_bar", "--duration", "0.05", "--branches"]) == 0
     picture = (tmp_path / "four_bar-branches.svg").read_text()
@@ -382,7 +384,8 @@ def test_command_animate_draws_the_branches_of_a_crossing_side_by_side(tmp_path,
 
 
 def test_command_animate_names_the_option_that_shows_several_branches(tmp_path, capsys, monkeypatch):
-    """The rhombus has two branches at 3/2 π / (124.8 rad/s) = 0.0377595 s."""
+    """The rhombus, driven at 124.8 rad/s from π/2, is flat for the second time after 3/2 π, at 0.0377595 s,
+    where it has two branches. A picture without --branches shows one, and the command says so."""
     monkeypatch.chdir(tmp_path)
     assert main(["animate", "four_bar", "--duration", "0.05"]) == 0
     assert "position 2 at t = 0.0377595 s: 2 branches; --branches shows" in capsys.readouterr().out

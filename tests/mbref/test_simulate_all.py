@@ -176,14 +176,15 @@ def test_variants_by_methods_of_each_kind_together_equal_single_runs(method):
 
 
 def test_run_of_an_ensemble_is_equal_after_pickling():
-    """Also a run that was computed in a batch, here the second of four."""
+    """The run was computed in a batch, as the second of four; all its numbers (``results``) are equal."""
     run, *_ = simulate_all(list(variants(CRANK, [MASS], 4)), METHOD, TIMES, LIMITS)[1:]
     sent = pickle.loads(pickle.dumps(run))
     assert results(sent) == results(run)
 
 
 def test_ensemble_raises_the_faults_of_its_first_faulty_scene():
-    """In scene 1 the rod must not turn about an axis in its plane; in scene 3, the crank."""
+    """Scene 1 gives the rod, and scene 3 the crank, a rate about an axis in the plane, which their joints
+    forbid. The faults are those that a single run of scene 1 has."""
     scenes = list(variants(CRANK, [MASS], 4))
     for place, body in ((1, "rod"), (3, "crank")):
         scenes[place] = scenes[place].with_(f"body[{body}].angular_velocity", (5.0, 0.0, 0.0))

@@ -294,10 +294,10 @@ def test_driver_that_turns_back_before_the_flat_position_returns_to_the_start(di
     ids=["driven", "swinging", "swinging from higher"],
 )
 def test_accelerations_velocities_and_reactions_near_a_crossing_are_exact(scene):
-    """Closed form and reactions of the judge, at distances (rad of the crank) of up to 0.1 on both sides,
-    over the largest value. Accelerations meet it to ten rtol, velocities to 3e-11 (rounding over a crossing).
-    Driven, reactions meet it to 1e-6; free, to rtol over the distance, or over 3e-5 rad if it is nearer.
-    Nearer than 1e-7 rad the judge's rank leaves reactions open: there they are those of the sample before, to
+    """Samples are up to 0.1 rad of the crank before and behind the crossing. The truth are the judge's closed
+    form and its reactions. Errors over the largest value: accelerations ten rtol; velocities 3e-11, rounding
+    over a crossing; reactions 1e-6 if driven. Those of a swing grow as rtol / distance, up to 3e-5 rad from
+    the crossing. Within 1e-7 rad the judge's rank leaves reactions open: they are the sample before, to
     1e-5."""
     (crossing, *_) = simulate(scene, "taylor", [0.3]).crossings
     rate = np.abs(crossing.angular_velocity[0]).max()

@@ -19,13 +19,13 @@ RTOL = 1e-9  # of the runs; limits are 1, 100 or 1000 of it: errors of the steps
 ROUNDING = 1e-12  # of poses over the length
 
 
-def upright_slider_crank(rod: float | None) -> Scene:
+def upright_slider_crank(rod_rate: float | None) -> Scene:
     """Return the slider-crank of equal crank and rod, both upright: the crank turns at 30 rad/s, the rod at a
-    given rate (rad/s)."""
+    given rate (rad/s), or None."""
     scene = slider_crank(0.308, 0.308, UPRIGHT, "upright", rate=30.0)
     crank, coupler, slider = scene.body
-    if rod is not None:
-        coupler = coupler.model_copy(update={"angular_velocity": (0.0, 0.0, rod)})
+    if rod_rate is not None:
+        coupler = coupler.model_copy(update={"angular_velocity": (0.0, 0.0, rod_rate)})
     return scene.with_(body=(crank, coupler, slider))
 
 

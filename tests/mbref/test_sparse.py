@@ -24,10 +24,10 @@ from mbref.simulation.simulate import simulate
 
 @given(bodies=st.integers(1, 12), rows=st.integers(1, 40), seed=st.integers(0, 999))
 def test_sparse_factor_solves_multiplies_and_has_pivots_as_dense_matrices(bodies, rows, seed):
-    """Random blocks of two bodies a row make D and S = D Dᵀ, with its diagonal times 1 + 1/α. By dense
-    matrices: the residual of S b = r over |S| |b|, Dᵀ r and r - D x, all to rounding of sums of at most 72
-    terms; and the pivots of Cholesky's factor of S over √S_ii, whose least value is √(1/α), to a millionth
-    of this."""
+    """Each row of D has random entries of up to two bodies; S is D Dᵀ with its diagonal times 1 + 1/α. By
+    dense matrices S b = r holds to rounding over |S| |b|, and so do Dᵀ r and r - D x, sums of at most 72
+    terms. The pivots are those of Cholesky's factor of S over √S_ii. None is below √(1/α); a millionth of
+    this is allowed."""
     rounding = 1e-12
     rng, n = np.random.default_rng(seed), 6 * bodies
     columns = 6 * rng.integers(0, bodies, rows)[:, None] + np.arange(6)

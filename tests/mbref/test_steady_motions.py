@@ -39,8 +39,8 @@ def test_a_pendulum_on_a_spindle_leaves_the_axis_above_the_critical_rate(rate):
     eigenvalues are I s² = -(m g l cos α - m l² Ω² cos 2α), I = OWN + m l²; s² < 0 is stable. Eigenvalues are
     exact to rounding of sums of 1e3, 1e-11."""
     found = equilibria(turning_pendulum(rate))
-    beside = G / (LENGTH * rate**2)
-    expected = [0.0, np.pi] + ([np.arccos(beside), -np.arccos(beside)] if beside < 1 else [])
+    cosine = G / (LENGTH * rate**2)
+    expected = [0.0, np.pi] + ([np.arccos(cosine), -np.arccos(cosine)] if cosine < 1 else [])
     assert np.allclose(sorted(angle(each) for each in found), sorted(expected), atol=ACCURACY)
     for each in found:
         a = angle(each)

@@ -32,8 +32,8 @@ def test_motion_by_series_is_the_closed_form(form):
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8])
 @pytest.mark.parametrize("form", [pendulum, torsion], ids=lambda form: form.__name__)
 def test_error_by_series_is_a_fiftieth_to_a_ten_thousandth_of_the_tolerance(form, rtol):
-    """The error (rad) exceeds neither the tolerance, with a margin of 50, nor do steps much shorter than it
-    asks for leave an error far below it."""
+    """The error (rad) is below rtol / 50. It is above rtol / 10 000: steps much shorter than rtol asks for
+    would leave less."""
     scene, exact = form()
     times = np.linspace(0.0, scene.duration, 3)
     turned = simulate(scene, "taylor", times, Limits(rtol=rtol)).orientation
@@ -115,8 +115,8 @@ def test_spring_whose_ends_meet_pulls_back_as_the_bar_s_own_equation(beside, rto
     ("place", "damping"), [(0.4, 0.0), (-0.4, 0.5)], ids=["coincide at the start", "meet, with a damper"]
 )
 def test_spring_without_natural_length_turns_a_bar_as_its_equation(place, damping):
-    """From the ground at p to the bar's tip at a, p = ±a: J θ'' = -k a p sin θ - ½ c (a² + a p cos θ) θ',
-    solved by SciPy."""
+    """The spring is between (p, 0) on the ground and the bar's tip at the radius a = 0.4 m, p = ±a. The truth
+    is J θ'' = -k a p sin θ - ½ c (a² + a p cos θ) θ', solved by SciPy."""
     scene, rtol = sprung_bar(12.0, place, natural_length=0.0, damping=damping), 1e-9
     run = simulate(scene, "taylor", [0.0, 0.7], Limits(rtol=rtol))
     inertia, tip, stiffness = 0.0133 + 0.2**2, 0.4, 20.0
