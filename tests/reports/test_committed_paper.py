@@ -53,7 +53,7 @@ def test_paper_s_records_are_of_one_clean_commit_that_the_readme_states(records)
 
 
 def test_no_stored_run_of_the_paper_timed_out_or_crashed(records):
-    """Such an end says nothing about a method."""
+    """Both ends are those of a process, and say nothing about a method."""
     ended = [label for label, r in records.records.items() if r["outcome"] in ("TIMED_OUT", "CRASHED")]
     assert not ended, ended
 

@@ -33,7 +33,8 @@ def test_exact_run_is_drawn_on_the_exact_motion():
 
 
 def test_compared_runs_are_drawn_with_title_error_and_singular_positions():
-    """Two runs with an error of 0.5, side by side, and a singular position at 0.01 s. No script is needed."""
+    """Two runs with an error of 0.5, side by side, and a singular position at 0.01 s. Titles have the
+    settings step and rtol, and no others such as a margin. No script is needed."""
     shown = Run(record("mujoco", "defaults", 0.5, 0.1, step=0.1, margin=3))
     picture = mechanisms.compared(scene(), exact(scene()), [shown, shown], [0.01])
     texts = [node.text for node in ET.fromstring(picture).iter(f"{SVG}text")]
@@ -91,5 +92,5 @@ def test_marked_instants_are_the_singular_positions_of_a_slider_crank_of_equal_l
 
 @pytest.mark.slow
 def test_no_instant_is_marked_on_a_slider_crank_of_unequal_lengths():
-    """Its rod is longer than the crank, so that no position is singular."""
+    """The rod is longer than the crank, so that no position is singular."""
     assert singular_instants(SCENES["planar_slider_crank"]()) == []

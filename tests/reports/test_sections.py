@@ -157,7 +157,8 @@ def test_summary_says_if_engines_move_different_mechanisms(shifts, words):
 
 
 def test_model_check_that_timed_out_is_no_difference():
-    """One engine's short motion is the truth; another's run timed out, or is 1e-4 m off, which is one."""
+    """One engine's short motion is the truth. Another's run that timed out is no difference from it, and one
+    that is 1e-4 m off is a difference."""
     late = {**nothing("c", "x"), "outcome": "TIMED_OUT"}
     found = [
         by_scene(records()[:3], {scene().name: scene()}, [at_gate(0.0), other])[0].difference()
@@ -174,8 +175,8 @@ def at_gate(shift: float) -> dict:
 
 
 def test_outcome_table_shows_outcome_and_end_time_of_each_run():
-    """Of ten records seven complete at 0.02 s. Exudyn's do not converge, the paper's outcome (b), and end at
-    0.5 and 0.6 of it; Pinocchio's crashes at the start."""
+    """Of ten records seven complete at 0.02 s. Two of Exudyn do not converge, which the paper calls (b), and
+    end at 0.5 and 0.6 of this time. One of Pinocchio crashes at the start."""
     found = table(outcomes.render(groups()[0]), "Outcome")
     outcome, end = (list(found.header).index(name) for name in ("Outcome", "End time (s)"))
     assert [(row[0], row[outcome].strip(), row[end]) for row in found.rows] == [
@@ -188,7 +189,8 @@ def test_outcome_table_shows_outcome_and_end_time_of_each_run():
 
 
 def test_failure_marks_are_explained_with_outcome_and_message():
-    """Mark 1 are two runs of Exudyn that did not converge, mark 2 one of Pinocchio that crashed."""
+    """Mark 1 stands for two runs of Exudyn that did not converge, mark 2 for a run of Pinocchio that crashed
+    at the start."""
     found = table(speed.render(groups()[0]), "Mark")
     assert [row[:5] for row in found.rows] == [
         ("1", "exudyn", "tuned", "2", "NOT_CONVERGED"),
@@ -244,5 +246,5 @@ def test_runs_with_errors_above_a_hundred_tolerances_are_counted():
     found = summary.render([SceneRuns(scene(), runs)])
     text = next(b.text for b in found if isinstance(b, Text))
     assert "relative tolerance: 2; of these, with an error above 100 times their tolerance: 1." in text, text
-    table = next(b for b in found if isinstance(b, Table))
-    assert column(table, "Wrong or failed")["a", "b"].startswith("1 with error above 100 rtol, NOT_CONV")
+    shown = next(b for b in found if isinstance(b, Table))
+    assert column(shown, "Wrong or failed")["a", "b"].startswith("1 with error above 100 rtol, NOT_CONV")
