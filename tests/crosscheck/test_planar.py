@@ -124,9 +124,9 @@ def guided() -> tuple[Scene, Scene]:
 
 @pytest.mark.parametrize("name", FREE)
 def test_plane_replaces_the_guide_of_a_slider_crank(name: str) -> None:
-    """A spherical slider joint becomes a hinge, so that a plane across it leaves the slider-crank's freedom;
-    the truth is the motion with the guide. Positions (m) are off by at most ten times the engine's error in
-    MEASURED."""
+    """The slider's ball joint is a hinge here, so that a plane in place of the guide leaves one degree of
+    freedom, too. The truth is the motion with the guide. Positions (m) are off by at most ten times the
+    engine's error in MEASURED."""
     base, planar = guided()
     assert (mbref.counts(base).redundant, mbref.counts(planar).redundant) == (3, 1)
     times = np.linspace(0, 0.1, 4)

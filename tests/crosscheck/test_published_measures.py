@@ -43,8 +43,8 @@ def test_energy_measure_is_the_largest_change_in_joule():
 
 
 def test_distance_measures_compare_a_centre_with_the_truth():
-    """Body "far" is 5 m from the origin, and off by 0.5 m at one of three samples: largest distance 0.5 m,
-    over 5 m 0.1, and root mean square 0.5 m / √3."""
+    """Body "far" is 5 m from the origin, and off by 0.5 m at one of three samples. The largest distance is
+    0.5 m, relative to 5 m it is 0.1, and the root mean square of three samples is 0.5 m / √3."""
     off, true = moved(1, 1, (0.3, 0.0, 0.4)), at_rest()
     assert measures.distance("far")(SCENE, off, true) == pytest.approx(0.5)
     assert measures.distance("arm")(SCENE, off, true) == 0.0

@@ -54,8 +54,8 @@ def test_tolerance_of_a_hundredth_reduces_ida_s_error_fivefold() -> None:
 
 
 def test_ida_swings_a_torsion_spring_past_two_turns_as_the_closed_form() -> None:
-    """Released at 0 with a natural angle of 8 rad, it swings about it, past 14 rad, as the damped oscillator;
-    the deviation is at most ten times the measured 2.9e-7 rad."""
+    """A wheel released at 0 swings about the spring's natural angle, 8 rad, past 14 rad. The truth is the
+    damped oscillator; the deviation is at most ten times the measured 2.9e-7 rad."""
     inertia, stiffness, damping, natural = 0.5, 2.0, 0.05, 8.0
     wheel = Body(name="wheel", mass=1.0, inertia=(0.3, 0.3, inertia), position=(0.0, 0.0, 0.0))
     axle = Revolute(name="J", bodies=("ground", "wheel"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))

@@ -223,8 +223,8 @@ def test_unknown_view_is_refused(text):
 
 
 def test_planar_mechanism_is_viewed_along_its_normal_and_a_spatial_one_obliquely():
-    """Three points in the plane y = 0, with the axis of a hinge across it, and along it; and three points in
-    an oblique plane."""
+    """Three points in the plane y = 0 are planar with a hinge across it, and spatial with a hinge along it;
+    three points in an oblique plane are viewed obliquely, too."""
     points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 1.0]])
     assert view_of(points, [(0.0, 2.0, 0.0)]) == View.parse("xz")
     assert view_of(points, [(0.0, 0.0, 1.0)]) == View.parse("oblique")

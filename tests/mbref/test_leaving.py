@@ -29,8 +29,8 @@ METHODS = [
 @pytest.mark.parametrize("name", SCENES)
 def test_no_method_without_projection_completes_on_another_motion(name, method):
     """METHODS are formulations with each stabilisation except projection; SCENES cross, turn back before or
-    miss a singular position. A run that completes is within 2000 rtol, and at least 2e-6, of the judge's
-    closed form: twice the difference from a projected run from which on its outcome is LEFT_MOTION."""
+    miss a singular position. A run that completes is within the larger of 2000 rtol and 2e-6 of the judge's
+    closed form; half of this is the difference from a projected run above which it ends LEFT_MOTION."""
     scene, end = SCENES[name]
     for rtol in (1e-5, 1e-9):
         run = simulate(scene, method, np.linspace(0.0, end, 9), Limits(rtol=rtol, most_steps=5_000))

@@ -26,8 +26,8 @@ from mbref.simulation.simulate import simulate
 def test_sparse_factor_solves_multiplies_and_has_pivots_as_dense_matrices(bodies, rows, seed):
     """Each row of D has random entries of up to two bodies; S is D Dᵀ with its diagonal times 1 + 1/α. By
     dense matrices S b = r holds to rounding over |S| |b|, and so do Dᵀ r and r - D x, sums of at most 72
-    terms. The pivots are those of Cholesky's factor of S over √S_ii. None is below √(1/α); a millionth of
-    this is allowed."""
+    terms. A second solution, by the finished factor, has the bits of the first, during factorisation. Pivots
+    are those of Cholesky's factor of S over √S_ii. None is below √(1/α); a millionth of this is allowed."""
     rounding = 1e-12
     rng, n = np.random.default_rng(seed), 6 * bodies
     columns = 6 * rng.integers(0, bodies, rows)[:, None] + np.arange(6)
@@ -57,7 +57,7 @@ def test_sparse_factor_solves_multiplies_and_has_pivots_as_dense_matrices(bodies
     first = b.copy()
     b[:] = rhs
     solve(memory, b)
-    assert np.array_equal(b, first), "another solution by the factor than with it"
+    assert np.array_equal(b, first), "the finished factor gives another solution"
     times_transpose(memory, rhs, factor.change)
     assert np.abs(factor.change - d_true.T @ rhs).max(initial=0) < rounding
     b[:] = rhs

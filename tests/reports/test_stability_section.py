@@ -86,8 +86,8 @@ def test_stability_section_is_rendered_from_stored_records_and_names_their_missi
     ],
 )
 def test_stability_cell_shows_correct_digits_or_the_letter_of_the_end(error, outcome, text, red):
-    """Digits are -log10 of the error; a wrong motion is red on the page and bold in Markdown. The only record
-    is of gap 0.1 m, the first column; the others are empty."""
+    """Digits are -log10 of the error, rounded down. A completed run of a wrong motion is red on the page and
+    bold in Markdown. The only record is of gap 0.1 m, the first column; the others are empty."""
     blocks = section.render([record("gap", 1e-1, error, outcome)])
     (heat,) = [b for b in blocks if isinstance(b, HeatMap)]
     cell, *others = heat.rows["taylor"]
