@@ -51,7 +51,7 @@ def test_every_evaluation_of_dop853_is_counted() -> None:
 
 
 def test_noise_in_one_stage_of_the_shortest_step_is_stepped_over() -> None:
-    """y' = 1, except for 1e9 where the sixth stage of the first, shortest step evaluates it: y(1) is 1. The
+    """y' is 1, but 1e9 at the state that the sixth stage of the first, shortest step reaches: y(1) is 1. The
     lengths of JUMPS are tried there, and each counts as a rejected step; no other step meets the noise."""
     shortest = 1e-3
     noisy = DOP853.C[5] * shortest
@@ -66,8 +66,8 @@ def test_noise_in_one_stage_of_the_shortest_step_is_stepped_over() -> None:
 
 
 def test_noise_where_a_shortest_step_is_corrected_does_not_spoil_the_result() -> None:
-    """y' = 1, except for 1e9 just where the first, shortest step is corrected. Each step is corrected by
-    1e-9: y(1) is 1 and 1e-9 a step, to rounding."""
+    """y' is 1, but 1e9 at the state to which the first, shortest step is corrected. Each correction adds
+    1e-9, so that y(1) is 1 plus 1e-9 for each step, to rounding."""
     shortest, moved = 1e-3, 1e-9
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
