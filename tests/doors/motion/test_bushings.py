@@ -66,9 +66,9 @@ def test_taylor_refuses_a_bushing_and_names_the_method_to_use(tmp_path, capsys):
     assert "use alf-dual+projection/dop853" in " ".join(capsys.readouterr().err.split())
 
 
-def test_acceleration_by_the_judge_has_the_damping_of_a_bushing_whose_ends_part():
-    """The block's is -c v / m. A pendulum at rest has -m g l² / I, as without its bushing: a division by the
-    length zero would fail the test by its warning. Both are exact to rounding."""
+def test_acceleration_at_the_start_by_the_judge_has_the_damping_of_a_bushing_of_length_zero():
+    """The block moves at v, so that x'' = -c v / m. The pendulum is at rest, so that y'' = -m g l² / I as
+    without the bushing. A division by the length zero would warn, and a warning fails a test."""
     assert gauss(on_a_slide())[0, 0] == pytest.approx(-DAMPING / MASS * SPEED, rel=1e-12)
     level = pendulum((0.7, 0.0, 0.0), load=[bushing("rod", (1.0, 0.0, 0.0))])
     assert gauss(level)[0, 1] == pytest.approx(-MASS * G * 0.7**2 / (0.3 + MASS * 0.7**2), rel=1e-12)

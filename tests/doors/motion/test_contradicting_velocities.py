@@ -24,8 +24,9 @@ def free(body: Body) -> Body:
 @pytest.mark.parametrize("method", ["taylor", "lm2+projection"])
 @pytest.mark.parametrize(("bodies", "joint"), [((ARM, faster(LOAD)), "B"), ((faster(ARM), free(LOAD)), "A")])
 def test_error_names_the_joint_that_given_velocities_violate_and_by_how_much(bodies, joint, method):
-    """Hinge A holds the arm to the ground, and B the load to the arm: both keep their anchors together. The
-    body that is 0.5 m/s faster violates the hinge at which its velocity contradicts a given one."""
+    """Hinge A connects arm and ground, B load and arm; the given velocities fit both. With 0.5 m/s added to
+    the load's velocity, B would open at 0.5 m/s. With 0.5 m/s added to the arm's velocity, and none given to
+    the load, which can follow, A would."""
     wrong = MOTIONS["arm with revolute"]().with_(body=bodies)
     says = rf"joint\[{joint}\]: velocities given to bodies violate it by 0\.5 m/s"
     with pytest.raises(SceneError, match=says):
@@ -34,7 +35,8 @@ def test_error_names_the_joint_that_given_velocities_violate_and_by_how_much(bod
 
 @pytest.mark.parametrize("length", [1e-6, 1.0, 1e6])
 def test_rounding_of_velocities_at_rest_is_no_contradiction(length):
-    """A program wrote 4e-19 lengths a second, by which hinge A opens; 4e-10 is a contradiction."""
+    """The bodies are given 4e-19 lengths a second, as a program may write in place of zero: they move as from
+    rest. 4e-10 lengths a second, by which hinge A would open, are a contradiction."""
     at_rest = in_other_units(MOTIONS["arm with revolute"](), length, 1.0)
     at_rest = at_rest.with_(body=[free(body) for body in at_rest.body])
     arm, load = at_rest.body

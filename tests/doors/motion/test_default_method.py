@@ -26,7 +26,8 @@ SPARSE = "alf-dual+projection/dop853"
     ],
 )
 def test_default_method_is_sparse_matrices_for_large_mechanisms_of_small_loops_and_else_taylor(name, method):
-    """The table has the faster of both methods for each scene, as `docs/methods.md` reports it."""
+    """The table has the faster method of each family of scenes at this size, by `benchmarks/growth.py`; the
+    page docs/growth.md has its measurements at similar sizes."""
     assert default_method(find_scene(name)) == method
 
 
@@ -60,7 +61,7 @@ CLOSE = 10 * RTOL  # m, in mechanisms of 40 m
 
 @pytest.mark.parametrize("method", BOTH)
 def test_41_loops_move_as_their_closed_form_by_sparse_matrices_and_by_taylor_series(method):
-    """The links of a chain of parallelograms have one angle, by the energy."""
+    """All cranks of a chain of parallelograms have one angle, whose closed form follows from the energy."""
     scene, times = find_scene("four_bar_chain[41]"), [0.0, 0.05]
     run = simulate(scene, method, times, Limits(rtol=RTOL))
     assert run.outcome.name == "COMPLETED", run.message

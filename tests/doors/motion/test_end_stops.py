@@ -57,7 +57,8 @@ def pushed() -> Scene:
 def test_bounces_follow_each_other_in_a_geometric_series(method, close):
     """A mass m = 2 kg falls by h = 1 m with g = 10 m/s² and e = 0.5: at t₀ = √(2 h / g) = 0.447 s, and after
     flights of 2 eᵏ t₀, k = 1, 2, …, of which four end before 1.3 s. Impulses are m (1 + e) eᵏ g t₀, up to 13
-    N s, and kinetic energies fall by e². The last bounces are small: relative errors may be 100 times."""
+    N s, and kinetic energies fall by e². Limits of their relative errors are 100 times those of times (s), as
+    the last bounces are small."""
     e, t0 = 0.5, np.sqrt(2 / G)
     motion = mbref.simulate(ball(e, 1.3), method, times=[0.0, 1.3])
     count = len(motion.events)
@@ -81,8 +82,9 @@ def ball_on_plate(restitution: float, duration: float) -> Scene:
 
 @pytest.mark.parametrize(("scene", "below"), [(ball, 0.0), (ball_on_plate, 3.0)], ids=["ground", "plate"])
 def test_bounces_without_end_become_a_contact_that_carries_the_weight(scene, below):
-    """With e = 0.2 they end at t₀ (1 + e) / (1 - e) = 1.5 t₀, to the flights below 1e-6 of the end time, 1 s,
-    which are left out. The lowest joint carries the weight of 2 kg and of the mass ``below`` them (kg)."""
+    """With e = 0.2 bounces end at t₀ (1 + e) / (1 - e) = 1.5 t₀. A run of 1 s leaves out flights shorter than
+    1e-6 s, so that its last event is early by a few of them. Then the lowest joint carries the weight of 2 kg
+    and of the mass ``below`` the ball (kg)."""
     motion = mbref.simulate(scene(0.2, 1.0), "taylor", times=[0.0, 0.9, 1.0])
     last = motion.events[-1]
     assert last.stops == last.chatter == ("S.lower",) and "bounces end" in last.sentence
@@ -112,7 +114,7 @@ def meetings(e: float, end: float) -> Iterator[float]:
 
 
 def test_ball_meets_a_vibrating_table_at_the_roots_of_its_flights():
-    """``meetings`` are the truth. Where the ball meets the table, all bodies and joints are in one point."""
+    """``meetings`` computes the truth. At a meeting all bodies and joints are in one point."""
     place, stop = (0.0, 0.0, 0.3), {"lower": -0.3, "restitution": 0.7}
     bodies = [body("table", 1.0, [0.1] * 3, ORIGIN), body("ball", 2.0, [0.1] * 3, place)]
     joints = [slide("T", "ground", "table", ORIGIN, Z), slide("S", "table", "ball", place, Z, stop=stop)]
@@ -194,8 +196,9 @@ def vibration(share: float) -> Scene:
 
 @pytest.mark.parametrize("share", [1e-2, 1e-4, 1e-8])
 def test_stop_just_below_the_reach_of_a_vibration_is_met(share):
-    """At asin(1 - share) / 4 s, with the rate cos 4 t, of which half is left. Rounding of places costs
-    ROUNDED / rate of a time, and 16 times as much of the rate."""
+    """At asin(1 - share) / 4 s, with the rate cos 4 t, of which half is left. A rounded place changes the
+    time by up to ROUNDED / rate, and the rate by this times 4 m/s², the acceleration, with a margin of
+    four."""
     time, rate = np.arcsin(1 - share) / 4, np.sqrt(share * (2 - share))
     (event,) = mbref.simulate(vibration(share), "taylor", times=[0.0, 0.5], rtol=1e-13).events
     assert event.stops == ("S.upper",) and abs(event.time - time) <= ROUNDED / rate
@@ -230,7 +233,8 @@ def test_judge_finds_the_events_by_itself(scene, formulation):
     ],
 )
 def test_fault_of_a_stop_is_named(stop, says):
-    """A stop must have the start, 0 m, in its range, an end, a restitution of at most 1, and a length."""
+    """A stop must have the start, 0 m, in its range, an end, and a restitution of at most 1. The ends of a
+    slide are lengths."""
     with pytest.raises(SceneError, match=says):
         ball(0.5, 1.0).with_(joint=[slide("S", "ground", "ball", ORIGIN, Z, stop=stop)])
 
@@ -267,7 +271,8 @@ def test_short_pull_lifts_a_mass_off_its_stop():
 
 @pytest.mark.parametrize("duration", [0.02, 0.2])
 def test_first_pull_of_a_fast_force_ends_the_contact_in_runs_of_any_length(duration):
-    """5 sin(80 π t) N exceeds the weight, 1 N, first at asin(1/5) / 80 π, about 0.8 ms."""
+    """5 sin(80 π t) N exceeds the weight, 1 N, first at asin(1/5) / 80 π, about 0.8 ms. The event before, at
+    0 s, is the start of the contact."""
     sine = {"polynomial": [0.0], "sine": {"amplitude": 1.0, "frequency": 80 * np.pi}}
     push = {"force": 5.0, "factor": sine}
     motion = mbref.simulate(held_by_its_weight(duration, push), times=[0.0, duration])

@@ -1,4 +1,4 @@
-"""Facts of mechanisms of many bodies that must not depend on how they are found."""
+"""Many bodies: their largest distance, long chains in another order and frame, a long row of gears."""
 
 import functools
 from collections.abc import Callable
@@ -34,8 +34,8 @@ def frame(scene: Scene) -> Scene:
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_largest_distance_is_the_largest_of_all_pairs(shape):
-    """All pairs of points are compared here; the function orders them first. The points of the second set are
-    shuffled: one rounding of 4e-16 remains."""
+    """Here all pairs of points are compared; the function compares boxes of neighbouring points first. The
+    second set has the same points in random order. One rounding, 4e-16, remains."""
     points = SHAPES[shape]
     shuffled = np.random.default_rng(5).permutation(points)
     exact = np.sqrt(((points[:, None] - points) ** 2).sum(axis=2).max())

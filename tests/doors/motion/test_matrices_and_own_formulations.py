@@ -19,7 +19,8 @@ CLOSE = 1e-8  # of accelerations of formulations by pseudo-inverses, and of runs
 
 
 def moved(T, change):
-    """Return the coordinates q of matrices, displaced by (δr, δπ') of each body."""
+    """Return the coordinates q of matrices, with each body displaced by δr (m) and turned by δπ' (rad) about
+    its own axes; ``change`` has these six numbers for each body."""
     q, x = T.q.reshape(-1, 7).copy(), np.reshape(change, (-1, 6))
     q[:, :3] += x[:, :3]
     q[:, 3:] = rotations.multiply(q[:, 3:], np.insert(x[:, 3:] / 2, 0, 1.0, axis=1))
@@ -28,9 +29,9 @@ def moved(T, change):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_matrices_of_random_mechanisms_have_the_judges_accelerations(seed):
-    """At the start, with armatures, couplings, drivers, massless links and a modelled ground: Gauss's
-    principle of the judge, and M q̈ + Φ_qᵀ λ = g, Φ_q q̈ = γ, Φ_q v = ν, Φ = 0. Rounding leaves at most 1e-9
-    of the largest number."""
+    """Gauss's principle of the judge is the truth of q̈ at the start. The matrices must also satisfy M q̈ +
+    Φ_qᵀ λ = g, Φ_q q̈ = γ, Φ_q v = ν and Φ = 0. Mechanisms have armatures, couplings, drivers, massless links
+    and a modelled ground. Rounding leaves at most 1e-9 of the largest number."""
     scene = powered_mechanism(seed)
     T, exact = mbref.terms(scene), gauss(scene)
     assert T.M is not None and T.g is not None
@@ -49,9 +50,9 @@ def test_matrices_of_random_mechanisms_have_the_judges_accelerations(seed):
     "name", [n for n in MOTIONS if n.startswith(("arm with", "driven", "coupled", "planet"))]
 )
 def test_jacobian_and_right_hand_sides_are_differences_of_the_constraints(name):
-    """Φ_q = ∂Φ/∂q by columns, and d/dt (Φ_q v - ν) = Φ_q q̈ - γ along a motion of constant velocities v, also
-    where the state violates the constraints. Rotations are about the bodies' own axes. Φ_q agrees to CLOSE, γ
-    with a digit less."""
+    """Columns of Φ_q = ∂Φ/∂q are differences of Φ. As d/dt (Φ_q v - ν) = Φ_q q̈ - γ, it is -γ along a motion
+    of constant velocities v, q̈ = 0. The random state violates the constraints. Φ_q agrees to CLOSE, γ with a
+    digit less."""
     scene = MOTIONS[name]()
     rng, start = np.random.default_rng(5), mbref.terms(scene)
     n = len(start.columns)
@@ -82,9 +83,9 @@ def test_units_of_rows_say_how_they_scale_with_the_mechanism():
 
 
 def test_matrices_along_a_motion_have_its_energy_reactions_and_labels():
-    """½ vᵀ M v is the kinetic energy; -Φ_qᵀ λ of the rows of a point is the force on its joint's second body,
-    which a positive row pushes back: it is +λ. Energies and velocities agree to rounding, forces to rtol,
-    1e-9."""
+    """½ vᵀ M v is the kinetic energy. Rows "B: point" of Φ are the anchor's place on the first body minus
+    that on the second body. So the force -Φ_qᵀ λ on the second body is λ, the motion's reaction. Energies and
+    velocities agree to rounding, forces to rtol, 1e-9."""
     motion = mbref.simulate("spatial_slider_crank_gravity", times=[0.3])
     T = mbref.terms("spatial_slider_crank_gravity", t=0.3)
     assert 0.5 * T.v @ T.M @ T.v == pytest.approx(motion.kinetic_energy[0], rel=1e-12)
@@ -96,13 +97,13 @@ def test_matrices_along_a_motion_have_its_energy_reactions_and_labels():
 
 
 def pseudo_inverse(T):
-    """Moore–Penrose, for scenes whose bodies have diagonal moments and mass."""
+    """Return q̈ by the pseudo-inverse of Φ_q M^-½, for a diagonal mass matrix M."""
     root, free = np.diag(T.M) ** -0.5, T.g / np.diag(T.M)
     return free + root * (np.linalg.pinv(T.Phi_q * root, rcond=1e-10) @ (T.gamma - T.Phi_q @ free))
 
 
 def augmented(T):
-    """Lagrange multipliers with feedback of violations."""
+    """Return q̈ and λ by Lagrange multipliers, with Baumgarte's feedback of violations (10 1/s)."""
     n, m = len(T.v), len(T.Phi)
     matrix = np.block([[T.M, T.Phi_q.T], [T.Phi_q, np.zeros((m, m))]])
     right = np.r_[T.g, T.gamma - 20 * (T.Phi_q @ T.v - T.nu) - 100 * T.Phi]
@@ -112,8 +113,9 @@ def augmented(T):
 
 @pytest.mark.parametrize(("formulation", "chart"), [(pseudo_inverse, "projection"), (augmented, "none")])
 def test_own_formulation_turns_a_gear_pair_by_its_closed_form(formulation, chart):
-    """M t² / 2 J with J = J_A + r² J_B, over several full turns; r = -½ of it the other wheel. M = 2 N m, J_A
-    = 0.03 and J_B = 0.2 kg m². The bearings carry the tooth torques r α J_B and α J_A - M, α = M / J."""
+    """Wheel A turns by α t² / 2, up to 12.5 rad, and wheel B by r = -½ of it: α = M / (J_A + r² J_B) with M =
+    2 N m, J_A = 0.03 and J_B = 0.2 kg m². The moment of bearing B accelerates its wheel: r α J_B. On wheel A
+    the load acts, too: α J_A - M."""
     times = np.linspace(0.0, 1.0, 5)
     motion = mbref.simulate(
         gear_pair(), times=times, rtol=1e-10, formulation=formulation, stabilisation=chart
@@ -121,7 +123,7 @@ def test_own_formulation_turns_a_gear_pair_by_its_closed_form(formulation, chart
     assert motion.outcome.name == "COMPLETED"
     assert motion.method.startswith(f"own:{formulation.__name__}+{chart}")
     rate = 2.0 / (0.03 + 0.25 * 0.2)
-    assert motion.joint("A").angle == pytest.approx(rate * times**2 / 2, abs=CLOSE) and times[-1] * rate > 12
+    assert motion.joint("A").angle == pytest.approx(rate * times**2 / 2, abs=CLOSE)
     assert motion.joint("B").angle == pytest.approx(-0.5 * rate * times**2 / 2, abs=CLOSE)
     assert motion.joint("A").moment[:, 2] == pytest.approx(rate * 0.03 - 2.0, rel=CLOSE)
     assert motion.joint("B").moment[:, 2] == pytest.approx(-0.5 * rate * 0.2, rel=CLOSE)
@@ -135,7 +137,8 @@ def test_projection_holds_the_joints_of_an_own_formulation_to_rounding():
 
 
 def test_own_formulation_follows_loads_that_are_switched():
-    """A force of 1 N/kg acts from 0.5 s to 1.5 s: v t from then on, to the default rtol, 1e-9."""
+    """A force of 1 N/kg acts from 0.5 s to 1.5 s: x = (t - 0.5)² / 2, up to 0.5 m and 1 m/s, and then x grows
+    by 1 m/s. The sample at a switch has the acceleration after it. Errors are at most rtol, 1e-9."""
     scene = loads_over_time.pushed(Factor(start=0.5, stop=1.5))
     motion = mbref.simulate(scene, times=[0.0, 0.5, 1.0, 1.5, 2.0], formulation=pseudo_inverse)
     along = motion.joint("J").displacement
@@ -144,7 +147,8 @@ def test_own_formulation_follows_loads_that_are_switched():
 
 
 def test_own_stabilisation_replaces_the_state_after_each_step():
-    """Bodies that are stopped after each step are at rest at every sample."""
+    """The function returns q and zero velocities after each step: bodies are at rest at every later
+    sample."""
     seen = []
 
     def stopped(T):
@@ -160,12 +164,13 @@ def test_own_stabilisation_replaces_the_state_after_each_step():
     [
         (lambda T: np.linalg.inv(np.zeros((2, 2))), "SINGULAR_MATRIX", "Singular matrix at t = 0 s"),
         (lambda T: T.v + np.nan, "NOT_FINITE", ""),
-        (lambda T: T.g / 1.0 + 1.0, "VIOLATION", "joint"),
+        (lambda T: T.g + 1.0, "VIOLATION", "joint"),
     ],
     ids=["no inverse", "not a number", "leaves the constraints"],
 )
 def test_own_formulation_that_fails_ends_the_run_with_the_outcome_of_its_failure(formulation, outcome, says):
-    """It inverts a matrix of zeros, returns NaN, or accelerations that part the pendulum from its joint."""
+    """The formulations invert a matrix of zeros, return NaN, and return numbers that are no accelerations of
+    the pendulum, whose joint opens."""
     ended = mbref.simulate("point_pendulum", formulation=formulation)
     assert ended.outcome.name == outcome and says in ended.message
 

@@ -21,7 +21,7 @@ INDEPENDENT = (
     *("pendulum with spring with damping", "gears with armature"),
     *("driven angle by a sine", "loop with inline"),
 )
-REDUNDANT = {"four hinges": 3, "doubled hinge": 5}  # redundant rows: 20 - 17 and 10 - 5
+REDUNDANT = {"four hinges": 3, "doubled hinge": 5}  # rows - rank: 20 - 17 and 10 - 5
 
 
 def errors(name: str, method: str, rtol: float = RTOL) -> tuple[float, float, mbref.Motion]:
@@ -77,14 +77,15 @@ def test_formulation_without_the_claim_ends_at_the_start_with_the_number_of_redu
 
 @pytest.mark.parametrize("stabilisation", ["none", "projection"])
 def test_gram_schmidt_as_printed_has_the_judges_states_of_a_fully_driven_mechanism(stabilisation):
-    """Drivers prescribe all freedoms of the slider-crank. Errors of its poses against the judge's stored
-    states are below a fifth of rtol, 1e-10 (``limit``)."""
+    """mpi-gs-literal is the algorithm as the paper prints it. Drivers prescribe all freedoms of the
+    slider-crank. Errors of its poses against the judge's stored states are below a fifth of rtol, 1e-10
+    (``limit``)."""
     pose, _, _ = errors("spatial_slider_crank_driven", f"mpi-gs-literal+{stabilisation}")
     assert pose < limit("mpi-gs-literal")
 
 
 def test_gram_schmidt_as_printed_reports_a_singular_matrix_for_a_free_mechanism():
-    """The printed algorithm needs as many independent rows as coordinates."""
+    """The algorithm as the paper prints it needs as many independent rows as coordinates."""
     free = MOTIONS["four hinges"]()
     assert mbref.simulate(free, "mpi-gs-literal+none", times=[0.1]).outcome is Outcome.SINGULAR_MATRIX
 
@@ -135,13 +136,14 @@ def test_baumgartes_feedback_keeps_constraint_violations_small_that_grow_without
 
 @pytest.mark.parametrize("name", ["gears with armature", "arm with universal"])
 def test_projection_keeps_joints_closed_to_rounding(name):
-    """The judge computes residuals, of poses over the length (rad) and of velocities (rad/s), from the
-    samples. Steps of 10 ms without projection open the joints by more than 1000 times the limit."""
-    limit = 5e-15  # 22 units of 2⁻⁵²; 4 are measured, at rates up to 2 rad/s
+    """The judge computes from the samples how far joints are open (level 0) and at which rate (level 1), in
+    lengths of the mechanism or rad. Without projection steps of 10 ms open them 1000 times as far and
+    more."""
+    rounding = 5e-15  # 22 units of 2⁻⁵²; 4 are measured, at rates up to 2 rad/s
     closed, drifted = (errors(name, f"lm2+{s}/rk4[step=1e-2]")[2] for s in ("projection", "none"))
     for level in (0, 1):
-        assert violation_series(MOTIONS[name](), closed, level).max() < limit
-        assert violation_series(MOTIONS[name](), drifted, level).max() > 1000 * limit
+        assert violation_series(MOTIONS[name](), closed, level).max() < rounding
+        assert violation_series(MOTIONS[name](), drifted, level).max() > 1000 * rounding
 
 
 @pytest.mark.parametrize("formulation", [n for n in GENERAL if FORMULATIONS[n].handles_singular_mass])

@@ -1,4 +1,4 @@
-"""Motions and entries as objects of Python: bodies by name, scenes at samples, errors without pages."""
+"""Motions and entries of scenes as Python objects: bodies by name, scenes at samples, refused values."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,8 @@ def crank():
     "name", [n if n in GATE else pytest.param(n, marks=pytest.mark.slow) for n in MAKERS]
 )
 def test_scene_at_a_sample_continues_the_motion(name):
-    """From 0.4 to 1 of the duration, with all drivers, loads over time, springs, couplings and offsets."""
+    """The scene at 0.4 of the duration, with all drivers, loads over time, springs, couplings and offsets,
+    ends as the whole motion."""
     scene = MAKERS[name]()
     times = scene.duration * np.array([0.4, 1.0])
     whole = mbref.simulate(scene, times=times, rtol=1e-12)

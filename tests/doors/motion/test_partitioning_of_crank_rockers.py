@@ -15,7 +15,8 @@ from tests.helpers.spinning import spinning_mechanism
 RATE, END = 7.0, 0.45  # rad/s of the crank at the start, and s
 ORDINARY = (0.2, 0.5, 0.45, 0.55)  # crank, coupler, rocker and ground, m
 CHANGE_POINT = (0.2, 0.4, 0.3, 0.5)  # flat at half a turn of the crank
-MANY, PARTS = (ORDINARY, CHANGE_POINT, (0.1, 0.5, 0.45, 0.5)), (0.9998, 0.99, 0.5, 1.0002, 1.5)
+MANY = (ORDINARY, CHANGE_POINT, (0.1, 0.5, 0.45, 0.5))
+PARTS = (0.9998, 0.99, 0.5, 1.0002, 1.5)  # angle of the crank at the start / half a turn
 ALL_STEPS = (1e-4, 5e-4, 1e-3, 2e-3, 3e-3, 5e-3)  # s
 
 
@@ -65,15 +66,16 @@ def deviation(lengths: tuple[float, ...], angle: float, step: float) -> float:
     ],
 )
 def test_partitioning_keeps_the_branch_and_the_energy_of_a_crank_rocker(lengths, part, step, limit):
-    """The crank starts at a ``part`` of half a turn. Its pins C are within the limit (m) of the circles'
-    intersection, and the energy within it of its start. In 5 ms the crank turns by 0.035 rad, whose error of
-    order 4 is 1e-6. In its first step from 0.9998 it passes a singular position, which magnifies errors."""
+    """The crank starts at a ``part`` of half a turn. Pin C is within the limit (m) of an intersection of the
+    circles of coupler and rocker, and the energy within this relative limit of its start. The crank turns by
+    0.035 rad in a step of 5 ms, whose error of order 4 is 1e-6. From 0.9998 the first step of CHANGE_POINT
+    passes a singular position, which magnifies errors."""
     assert deviation(lengths, part * math.pi, step) < limit
 
 
 def test_velocities_of_a_four_bar_at_a_loose_tolerance_meet_the_closed_form():
-    """The links of a parallelogram have one rate, by the energy. With rtol 1e-3 errors are below 1e-3 of the
-    largest velocity."""
+    """Both cranks of a parallelogram have one rate, whose closed form follows from the energy. With rtol 1e-3
+    errors are below 1e-3 of the largest velocity."""
     scene, times = mbref.find_scene("four_bar_gravity"), np.linspace(0.25, 1.0, 4)
     exact = closed_form(scene).poses(times).velocity
     found = mbref.simulate(scene, "alf-dual+partitioning", times, mbref.Limits(rtol=1e-3))

@@ -25,8 +25,8 @@ def run_of(scene: Scene, method: str = METHOD, times=TIMES):
 
 def flattened(scene: Scene) -> Scene:
     """The scene with everything at z = 0."""
-    bodies = tuple(body.model_copy(update={"position": (*body.position[:2], 0.0)}) for body in scene.body)
-    joints = tuple(joint.model_copy(update={"anchor": (*joint.anchor[:2], 0.0)}) for joint in scene.joint)
+    bodies = tuple(each.model_copy(update={"position": (*each.position[:2], 0.0)}) for each in scene.body)
+    joints = tuple(each.model_copy(update={"anchor": (*each.anchor[:2], 0.0)}) for each in scene.joint)
     return scene.with_(body=bodies, joint=joints)
 
 
@@ -48,16 +48,16 @@ def doubled(loops: int, apart: float) -> Scene:
     ],
 )
 def test_planes_apart_move_as_in_one_plane_and_their_joints_carry_moments(name, method):
-    """The motion in one plane is the same scene at z = 0. Positions (m) agree to a tenth of the tolerance,
-    1e-10, and angular velocities (rad/s) to ten times it. Newton's and Euler's equations of every body need
-    moments out of the plane."""
+    """The same scene with all parts at z = 0 has the same motion. Positions (m) agree to a tenth of the run's
+    tolerance, 1e-10, and angular velocities (rad/s) to ten times it. Reactions balance every body by Newton's
+    and Euler's equations, which needs moments out of the plane."""
     scene = find_scene(name)
     apart, flat = run_of(scene, method), run_of(flattened(scene), method)
     assert apart.position[..., :2] == pytest.approx(flat.position[..., :2], abs=1e-11)
     assert apart.angular_velocity == pytest.approx(flat.angular_velocity, abs=1e-9)
     assert max(unbalanced(scene, apart)) < UNBALANCED, "reactions balance every body, out of the plane too"
     size = max(np.abs(wrench[:, 3:5]).max() for wrench in apart.reactions.values())
-    assert size > 0.01, "joints carry moments out of the plane, N m"
+    assert size > 0.01, "joints carry moments out of the plane, N m, far above rounding"
 
 
 @pytest.mark.parametrize("about", [(np.pi / 2, 0.0, 0.0), (0.0, np.pi / 2, 0.0), (0.4, 0.2, -0.3)])
@@ -101,7 +101,7 @@ def test_links_on_a_ball_joint_leave_their_planes_where_a_force_pushes(method):
 
 
 def crankshaft(singular: int, count: int) -> Scene:
-    """Slider-cranks on one shaft, of which one has a rod as long as its crank."""
+    """Slider-cranks on one shaft; the rod of number ``singular`` is as long as its crank."""
     bodies, joints = [], []
     for i in range(count):
         rod = 0.304 if i == singular else 0.4048
@@ -115,22 +115,22 @@ def crankshaft(singular: int, count: int) -> Scene:
 
 @pytest.mark.parametrize("singular", [0, 3])
 def test_one_singular_loop_among_many_ends_the_run(singular):
-    """Five cylinders on a shaft at 30 rad/s; one has a rod as long as its crank. The run ends in the first
-    turn, where this crank is across the slide and on one line with its rod, to 1e-3 rad."""
+    """Of five slider-cranks on a shaft at 30 rad/s one has a rod as long as its crank. The run ends in the
+    first turn at its singular position: crank and rod are on one line across the slide, to 1e-3 rad."""
     scene = crankshaft(singular, 5)
     run = simulate(scene, METHOD, np.linspace(0.0, 0.1, 21))
     assert run.outcome.name == "SINGULAR_POSITION", run.message
     [met] = run.crossings
     k = scene.body_index(f"crank{singular}")
     reach = met.position[k, :2] / np.linalg.norm(met.position[k, :2])
-    assert abs(reach[0]) < 1e-3, "crank and rod are on one line where the crank is across the slide"
+    assert abs(reach[0]) < 1e-3, "the crank is across the slide, which is along x"
     assert 0.0 < run.t_end < 2 * np.pi / 30.0
 
 
 def test_run_of_a_crankshaft_without_singular_loops_completes():
-    """All five rods are longer than their cranks (-1: no singular cylinder). The shaft turns by half a turn,
-    over the dead centres, and its joints stay closed."""
+    """All five rods are longer than their cranks (no rod has the number -1). The shaft turns by 3 rad, over
+    dead centres, and its joints stay closed."""
     run = simulate(crankshaft(-1, 5), METHOD, np.linspace(0.0, 0.1, 21))
     assert run.outcome.name == "COMPLETED", run.message
     assert run.violation.position.max() < 1e-9  # m
-    assert np.abs(np.ptp(run.position[:, run.bodies.index("crank0")], axis=0)).max() > 0.1  # m
+    assert np.ptp(run.position[:, run.bodies.index("crank0")], axis=0).max() > 0.1, "the crank turns, m"

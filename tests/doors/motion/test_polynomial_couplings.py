@@ -20,17 +20,18 @@ P = np.polynomial.Polynomial([0.0, *LAW])
 SPEED, TIMES = 4.0, np.linspace(0.0, 2.0, 9)  # 8 rad, so that the slope depends on full turns
 INERTIA = {"A": 0.3, "B": 2.0}  # kg m² about the hinge's axis, or kg along the slide
 ROUNDED = 1e-12  # relative to the largest value, some thousand roundings
-TOLERANCE = 1e-9  # of free motions, by the default tolerance 1e-10
+TOLERANCE = 1e-9  # m, rad, and relative to SPEED: the default rtol
 METHODS = pytest.mark.parametrize("method", ["taylor", "alf-dual+projection/dop853"])
 
 
 def cam(lead: str = "angle", follow: str = "displacement", **changes) -> Scene:
-    """Two bodies on the ground, whose coordinates along hinges or slides are coupled by the law P."""
-    parts, rate = {"body": [], "joint": []}, [0.0, 0.0, SPEED] if lead == "angle" else [SPEED, 0.0, 0.0]
-    given = {"angular_velocity" if lead == "angle" else "velocity": rate}
-    for name, kind, place in (("A", lead, (0.0, 0.0, 0.0)), ("B", follow, (0.0, 1.0, 0.0))):
+    """Two bodies on the ground, whose coordinates along hinges or slides are coupled by the law P. Only the
+    first body has a given velocity."""
+    fast = {"angular_velocity": [0.0, 0.0, SPEED]} if lead == "angle" else {"velocity": [SPEED, 0.0, 0.0]}
+    parts = {"body": [], "joint": []}
+    for name, kind, place, given in (("A", lead, (0, 0, 0), fast), ("B", follow, (0, 1, 0), {})):
         parts["body"].append(body(name.lower(), INERTIA[name], [INERTIA[name]] * 3, place, **given))
-        maker, axis, given = (*((hinge, Z) if kind == "angle" else (slide, X)), {})
+        maker, axis = (hinge, Z) if kind == "angle" else (slide, X)
         parts["joint"].append(maker(name, "ground", name.lower(), place, axis))
     coupling = [{"name": "cam", "joints": ["A", "B"], "polynomial": list(LAW)}]
     return Scene(**{"name": "cam", "duration": 2.0, **parts, "coupling": coupling, **changes})
@@ -60,8 +61,9 @@ def test_driven_leader_moves_its_follower_by_the_polynomial(follow, method):
 
 @METHODS
 @pytest.mark.parametrize("lead", ["angle", "displacement"])
-def test_coupling_conserves_energy_and_transmits_no_power(lead, method):
-    """(I₁ + P'² I₂) q₁'² is constant; the coupling's forces -P' μ and μ have no power together."""
+def test_coupling_conserves_energy_and_the_powers_of_its_two_forces_cancel(lead, method):
+    """(I₁ + P'² I₂) q₁'² is constant, which is the truth of q₁'. The coupling's forces -P' μ on the first
+    body and μ on the second have opposite powers, as q₂' = P' q₁'."""
     motion = mbref.simulate(cam(lead), method, times=TIMES)
     (q, rate, force), (value, follower, push) = coordinate(motion, "A"), coordinate(motion, "B")
     reduced = INERTIA["A"] + P.deriv()(q) ** 2 * INERTIA["B"]
@@ -91,10 +93,11 @@ def test_formulations_of_the_judge_agree_with_mbref_over_full_turns():
 
 
 def test_offset_starts_at_a_pose_of_the_polynomial():
-    """q₂ = offset + P(q₁) holds at the start, and later, with coordinates from the poses in the file."""
+    """q₂ = 1.2 m + P(q₁) holds at the start and later. Coordinates count from the poses in the file, which do
+    not satisfy it: the start is elsewhere."""
     motion = mbref.simulate(cam("displacement").with_("coupling[cam].offset", 1.2), times=TIMES)
     q, value = (coordinate(motion, name)[0] for name in "AB")
-    assert np.abs(q[0]) > 0.1  # the start differs from the poses in the file
+    assert np.abs(q[0]) > 0.1  # m
     assert np.abs(value - 1.2 - P(q)).max() <= ROUNDED * np.abs(P(q)).max()
 
 
@@ -120,7 +123,8 @@ def test_mjcf_keeps_the_polynomial_and_engines_without_it_refuse(tmp_path):
     "law", [(0.3, 0.0, 0.0, -0.4), (1.0, -1.0, 1 / 3), LAW], ids=["end", "tangent", "LAW"]
 )
 def test_driver_of_the_follower_beyond_the_first_end_of_the_polynomial_comes_to_a_dead_position(law, method):
-    """q₂ = 3 t² reaches the value of P where P' = 0: no q₁ follows beyond, or only at infinite speed."""
+    """From rest q₂ = 3 t² reaches the value of P at its first q₁ with P' = 0: no q₁ satisfies the coupling
+    beyond, or, where P only has a level tangent, q₁' would be infinite."""
     polynomial = np.polynomial.Polynomial([0.0, *law])
     ends = [root.real for root in polynomial.deriv().roots() if abs(root.imag) < 1e-6 and root.real > 0.0]
     coupling = [{"name": "cam", "joints": ["A", "B"], "polynomial": list(law)}]

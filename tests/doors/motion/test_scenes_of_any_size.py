@@ -24,13 +24,15 @@ def motion_of(name, method, end):
 @pytest.mark.parametrize("method", METHODS)
 def test_floors_of_a_lattice_are_pendulums_on_pendulums(method):
     """Uprights of a floor stay parallel, and its bars horizontal. Lagrange's equations of the angles a from
-    the vertical are Σ M_ij cos(a_i - a_j) a_j'' = g c_i sin a_i - Σ M_ij sin(a_i - a_j) a_j'²."""
+    the vertical are Σ M_ij cos(a_i - a_j) a_j'' = g c_i sin a_i - Σ M_ij sin(a_i - a_j) a_j'². A floor
+    carries c_i = half of its uprights, its bars and all floors above; M_ij = c of the higher floor, and M_ii
+    counts the uprights by their moment about the foot. All are rods of 1 kg, 1 m and radius 0.01 m."""
     columns, floors, end = 2, 3, 0.2
-    above = np.arange(floors)[::-1] * (2.0 * columns + 1)  # kg on the tops of a floor, without its bars
+    above = np.arange(floors)[::-1] * (2.0 * columns + 1)  # kg of all higher floors
     carried = (columns + 1) / 2 + columns + above
     own = (columns + 1) * (1 / 4 + (3 * 0.01**2 + 1) / 12) + columns + above
-    pairs = np.maximum(np.arange(floors)[:, None], np.arange(floors))
-    mass = np.where(np.eye(floors, dtype=bool), np.diag(own), carried[pairs])
+    higher = np.maximum(np.arange(floors)[:, None], np.arange(floors))
+    mass = np.where(np.eye(floors, dtype=bool), np.diag(own), carried[higher])
 
     def rate(_, y):
         angle, speed = np.split(y, 2)
@@ -53,8 +55,9 @@ def test_floors_of_a_lattice_are_pendulums_on_pendulums(method):
 
 def test_platforms_of_a_sarrus_stack_fall_as_lagranges_equations():
     """Two levels, each of two pairs of bars (lower and upper, 0.5 m, 0.5 kg) at one angle a_k from the
-    horizontal, 60° at rest. A platform (1 kg) is 2 · 0.5 m · Σ sin a above the ground, over its own level and
-    those below. Lagrange's equations of a₀ and a₁, with Jacobians of heights and reaches, by scipy."""
+    horizontal, which is 60° at the start. Platform k (1 kg) is 2 · 0.5 m · (sin a₀ + … + sin a_k) above the
+    ground. Scipy integrates Lagrange's equations of a₀ and a₁: ``rises`` and ``reaches`` are the vertical and
+    horizontal places of all bodies over sin a and cos a."""
     count, end, length, bar_mass, platform_mass = 2, 0.15, 0.5, 0.5, 1.0  # s, m, kg, kg
     across = bar_mass * (3 * 0.01**2 + length**2) / 12  # kg m², of a bar of radius 0.01 m about its middle
     heights = [[0.5, 0], [1.5, 0], [2, 0.5], [2, 1.5]]  # middles of bars / (length sin a): lower, upper, …
@@ -89,7 +92,8 @@ def test_joints_of_walking_legs_stay_closed_and_their_energy_constant(method):
 
 
 def test_links_of_a_strandbeest_have_jansens_holy_numbers():
-    """Distances (cm) of hinges that share a link, and of the axle from both pivots; rods have 1 kg/m."""
+    """Theo Jansen's published lengths (cm), by his letters of links. A link has the names of its hinges; the
+    axle O is 38.0 beside and 7.8 above each pivot Q. Masses are the lengths of rods of 1 kg/m."""
     scene = find_scene("strandbeest[3]")
     at = {joint.name: np.array(joint.anchor)[:2] * 100 for joint in scene.joint}
     mass = {body.name: body.mass * 100 for body in scene.body}

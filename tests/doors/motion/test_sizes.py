@@ -30,11 +30,11 @@ def test_built_in_scenes_complete_with_proportional_positions_at_every_size(name
 
 def rack_and_pinion() -> Scene:
     """Return a driven pinion with armature, 2 rad/s and 6 rad/s², and a rack with armature on its slide."""
-    slide = {"type": "translational", "bodies": ["ground", "rack"], "anchor": (0, 0.2, 0), "axis": (1, 0, 0)}
+    guide = {"type": "translational", "bodies": ["ground", "rack"], "anchor": (0, 0.2, 0), "axis": (1, 0, 0)}
     return Scene(
         name="rack_and_pinion",
         body=[rod("pinion", ORIGIN), rod("rack", (0.0, 0.2, 0.0), mass=1.5)],
-        joint=[hinge("A", ("ground", "pinion")) | {"armature": 0.4}, {"name": "B", "armature": 0.7} | slide],
+        joint=[hinge("A", ("ground", "pinion")) | {"armature": 0.4}, {"name": "B", "armature": 0.7} | guide],
         coupling=[{"name": "teeth", "joints": ("A", "B"), "ratio": -0.2, "offset": 0.01}],
         driver=[{"joint": "A", "polynomial": (0.0, 2.0, 3.0)}],
     )
@@ -54,13 +54,14 @@ def test_torque_of_a_rack_and_pinion_is_its_closed_form_at_every_size(length, ma
 
 @pytest.mark.parametrize("length", [1e-6, 1e7])
 def test_wave_of_a_driver_that_begins_at_zero_to_rounding_is_accepted_at_every_size(length):
-    """The displacement is A (sin(t + p) - sin p), A = 0.12 m and p = 0.7 rad."""
-    start = round(-0.12 * np.sin(0.7), 14)  # as in a file
+    """The displacement is A (sin(t + p) - sin p), A = 0.12 m and p = 0.7 rad. The constant -A sin p has 14
+    decimals, as in a file, so that the wave begins at 1e-15 m or so."""
+    start = round(-0.12 * np.sin(0.7), 14)
     driver = {"joint": "S", "polynomial": [start], "sine": {"amplitude": 0.12, "phase": 0.7}}
     guide = slide("S", "block", ORIGIN, (1.0, 0.0, 0.0))
     scene = Scene(name="wave", body=[rod("block", ORIGIN)], joint=[guide], driver=[driver])
     run = simulate(in_other_units(scene, length, 1.0), times=[0.5])
-    wave = 0.12 * (np.sin(1.2) - np.sin(0.7))
+    wave = 0.12 * (np.sin(0.5 + 0.7) - np.sin(0.7))
     assert run.joint("S").displacement / length == pytest.approx([wave], rel=1e-12)
 
 

@@ -37,7 +37,7 @@ def fallen(scene: Scene) -> np.ndarray:
 
 
 def off(found: np.ndarray, exact: np.ndarray) -> float:
-    """Return the largest error, relative to a fall of one metre."""
+    """Return the largest error, m."""
     return float(np.abs(found - exact).max())
 
 
