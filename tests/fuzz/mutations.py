@@ -16,7 +16,7 @@ PAIR = {"bodies": ["leaf", "bolt"]}
 FULL = [[1.0, 0.1, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1.2]]  # kg m²
 STILL = {"velocity": [0.0, 0.0, 0.0], "angular_velocity": [0.0, 0.0, 0.0]}
 
-# a scene with every kind of joint, driver and load
+# a scene with six types of joints, a driver and four types of loads
 EVERYTHING = {
     "name": "everything",
     "gravity": [0.0, 0.0, -9.81],

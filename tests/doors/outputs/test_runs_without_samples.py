@@ -43,7 +43,7 @@ def test_files_of_a_run_without_samples_have_all_headers_and_no_rows(tmp_path, c
 
 @pytest.mark.parametrize("columns", [[], ["--columns", "energy"]])
 def test_json_of_a_run_without_samples_has_its_outcome_and_no_times(columns, capsys):
-    """STUCK ends at the start with a singular matrix."""
+    """The run of STUCK ends at the start with a singular matrix."""
     assert main(["run", *STUCK, "--json", *columns]) == 1
     (record,) = json.loads(capsys.readouterr().out)["records"]
     assert (record["outcome"], record["times"]) == ("SINGULAR_MATRIX", [])
@@ -70,7 +70,7 @@ def test_every_array_of_a_motion_without_samples_is_empty(stuck, tmp_path):
 
 
 def test_motion_of_another_engine_without_samples_has_empty_columns_of_all_parts():
-    """The scene has bodies, every type of joint and four loads, of which the last are springs."""
+    """The scene has five bodies, six types of joints and four loads, of which the last two are springs."""
     scene = mbref.Scene(**EVERYTHING)
     failed = Trajectory.failed(
         scene=scene.name, engine="other", version="1", method="m", settings={},

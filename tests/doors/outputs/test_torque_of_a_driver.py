@@ -129,8 +129,9 @@ def test_reflected_mass_of_a_slide_on_a_turning_arm_meets_no_centripetal_acceler
 
 
 def test_armature_of_a_hinge_between_turning_links_meets_their_relative_acceleration():
-    """The hand turns by φ - t², about its centre of mass at r: torque J (φ'' - 2) - 2 I of B, and
-    (J' + m r²) φ'' + J (φ'' - 2) of A, whose arm has J'."""
+    """The arm (J') turns by φ, and the hand (m, J), about its centre of mass at r, by -t² relative to the
+    arm. Its armature I resists this relative acceleration alone: motor B has J (φ'' - 2) - 2 I, and motor A
+    has (J' + m r²) φ'' + J (φ'' - 2)."""
     arm, hand, armature, mass, reach = 0.3, 0.2, 0.7, 1.0, 0.4
     bodies = [rod("arm", (0.0, 0.0, 0.0), 1.0, arm), rod("hand", (0.0, reach, 0.0), mass, hand)]
     joints = [

@@ -82,8 +82,9 @@ def test_spreadsheet_with_decimal_commas_is_read_with_the_values_of_the_motion(m
 
 
 def test_largest_reaction_of_a_crank_is_at_the_bottom(motion):
-    """m (ω² r + g) after three quarters of a turn. The largest moment at the anchor is the driver's torque
-    m g r, where the crank is level. The driver prescribes the motion, so that all is exact to rounding."""
+    """The force is m (ω² r + g) at the bottom, after three quarters of a turn at 0.75 s. The largest moment
+    is the driver's torque m g r where the crank is level, at 0, 0.5 or 1 s. The driver prescribes the motion,
+    so that all is exact to rounding."""
     found = motion.reaction_maxima()["A"]
     assert found.force == pytest.approx(MASS * (RATE**2 * RADIUS + G), rel=1e-12)
     assert found.force_time == 0.75 and found.open == 0
