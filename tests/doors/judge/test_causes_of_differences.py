@@ -159,6 +159,7 @@ def changed(path: str, value: object) -> Callable[[Scene, Table], Table]:
 
 LENGTHS = (".position", ".velocity", ".acceleration", ".displacement")
 ANGLES = (".angle", ".rate", ".angular_", "load(0).rate")
+# change of a table, and a part of its explanation; "r.position.x" is of bodies whose names end with r
 EVERYWHERE = {
     "mm": (scaled(1e3, ".position"), "in mm, not m"),
     "all lengths in mm": (scaled(1e3, *LENGTHS), "in mm, not m"),
@@ -218,8 +219,9 @@ OF_ONE_SCENE = {
 
 
 def cases(explained: bool) -> list[object]:
-    """Return scenes, changes and parts of the expected sentences, of changes with or without explanation. All
-    except cases of the rod, whose motion is computed fastest, are slow. No gravity acts on the rod."""
+    """Return cases (scene, change, part of the expected sentence) of changes that have an explanation, or
+    have none. All except cases of the rod, whose motion is computed fastest, are slow. No gravity acts on the
+    rod, so that cases of gravity are of other scenes."""
     found = []
     for scene, own in OF_ONE_SCENE.items():
         for name, case in {**EVERYWHERE, **MORE, **SIMULATED, **own}.items():
@@ -289,7 +291,8 @@ def test_damping_that_a_table_leaves_out_is_named_as_its_only_cause() -> None:
 
 
 def test_each_number_of_a_scene_is_tried_as_a_cause() -> None:
-    """A change by -1 times a number leaves it out; a switch is earlier by the duration, 1 s."""
+    """``changes`` has one change for each number; here each is told to change its number by -1 times itself,
+    which leaves it out, and a switch to act 1 s, the duration, earlier."""
     scene = switched_motor().with_(load=[*switched_motor().load, *damped_pendulum().load])
     assert {change.says(-1.0) for change in changes(scene)} == {
         "gravity of 0 m/s², not 9.81",
@@ -303,8 +306,9 @@ def test_each_number_of_a_scene_is_tried_as_a_cause() -> None:
 
 
 def test_search_for_a_cause_ends_when_the_clock_of_its_thread_has_gone_20_s(monkeypatch) -> None:
-    """This clock goes one second at each reading: 20 in the search, a few tens in the reference. The search
-    reads it before each of hundreds of causes; with the real clock it ends by itself within a second."""
+    """The clock is replaced by one that goes a second at each reading. The search reads it before each of
+    hundreds of causes, and so ends after 20; the reference, without a limit here, reads it a few tens of
+    times. With the real clock the search is complete."""
     table, clock = drifting(SCENES["spinning_rod"](), known("spinning_rod")), itertools.count()
     few = {n: table[n] for n in ("time", "A.angle")}
     assert crosscheck.judge_motion(spinning_rod(), few).is_complete
@@ -315,8 +319,8 @@ def test_search_for_a_cause_ends_when_the_clock_of_its_thread_has_gone_20_s(monk
 
 @pytest.mark.slow
 def test_search_for_a_cause_ends_after_20_cpu_seconds() -> None:
-    """Each changed scene of the long motion takes seconds, and no change is a drift: a whole search takes
-    minutes. Allowed are the reference, as long as here, and 5 s for the last scene."""
+    """Each changed scene of the long motion takes seconds, and no change explains a drift: a whole search
+    takes minutes. Allowed are 20 s, twice the time of the reference here, and 5 s for the last scene."""
     scene, began = double_pendulum().with_(duration=20.0), time.process_time()
     table = {n: c for n, c in motion(scene).items() if n == "time" or ".position" in n or ".rate" in n}
     start = time.process_time()

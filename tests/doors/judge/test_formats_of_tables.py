@@ -44,12 +44,12 @@ def random_part(seed: int) -> tuple[np.random.Generator, Scene, Table, str]:
 
 def unit(values: np.ndarray, form: str) -> float:
     """Return the unit of the last digit of the largest number of a column in a format."""
-    digits = {"repr": 16, "single precision": 7}.get(form)
-    if digits is None and (form.endswith("f") or "decimals" in form):
+    count = {"repr": 16, "single precision": 7}.get(form)  # of significant digits
+    if count is None and (form.endswith("f") or "decimals" in form):
         return 10.0 ** -int("".join(c for c in form if c.isdigit()))
-    if digits is None:
-        digits = int(form[2:-1]) + form.endswith("e")
-    return float(10.0 ** (np.floor(np.log10(np.abs(values).max())) - digits + 1))
+    if count is None:
+        count = int(form[2:-1]) + form.endswith("e")
+    return float(10.0 ** (np.floor(np.log10(np.abs(values).max())) - count + 1))
 
 
 def digits(values: np.ndarray, form: str) -> int:
@@ -107,17 +107,20 @@ def test_column_with_one_cell_that_is_ten_units_of_its_last_digit_wrong_is_off(s
     ],
     ids=["jumps", "slow", "even"],
 )
-def test_angles_that_are_not_the_motion_are_off_though_they_have_few_digits(rows, tmp_path):
-    """The angle of the double pendulum falls from 0; cells such as 0.5 stand for themselves, not for numbers
-    rounded to one digit, because tools leave trailing zeros away."""
+def test_wrong_angles_of_one_or_two_digits_are_off(rows, tmp_path):
+    """The exact angle of the double pendulum falls from 0 to -0.69 rad in 0.3 s. Half a unit of the last
+    digit, 0.05 rad at most, does not explain these angles."""
     path = tmp_path / "run.csv"
     path.write_text("\n".join(["time,A.angle", *rows]), encoding="utf-8")
     assert not crosscheck.judge_motion(double_pendulum(), path).is_right
 
 
 @pytest.mark.parametrize(("form", "verdict"), [("%.3f", "right, rounded to 2 digits"), ("%.12g", "right")])
-def test_command_states_the_rounding_of_an_angle_with_three_decimals_alone(form, verdict, tmp_path, capsys):
-    """Half a unit of three decimals exceeds a thousandth of the range of this angle, less than 0.1 rad."""
+def test_command_states_rounding_that_exceeds_a_thousandth_of_the_range_of_an_angle(
+    form, verdict, tmp_path, capsys
+):
+    """The 12 angles go from 0 to -0.098 rad. Half a unit of three decimals, 5e-4 rad, is more than a
+    thousandth (SHARE) of this range, and 0.098 has two digits; half a unit of twelve digits is less."""
     double_pendulum().save(tmp_path / "scene.toml")
     part = {n: exact("double_pendulum")[n][:12] for n in ("time", "A.angle")}
     path = write_table(part, tmp_path / "run.csv", FORMATS[form])
@@ -144,7 +147,8 @@ def test_times_that_are_rounded_are_compared_within_their_rounding(form: str, tm
 
 
 def test_zero_among_numbers_with_an_exponent_is_exact(tmp_path: Path) -> None:
-    """The angle 0.000e+00 is not rounded to three decimals: zero in place of a small angle is off."""
+    """A small angle in the format of 1.234e-05 has four digits. Written as 0.000e+00 it is off: this cell is
+    zero, and not a number below 5e-4 that is rounded to three decimals."""
     scene, path = double_pendulum(), tmp_path / "run.csv"
     table = crosscheck.reference_table(scene, np.array([0.0, 0.005, 0.1, 0.2]))
     part = {n: table[n].copy() for n in ("time", "A.angle")}
@@ -167,8 +171,9 @@ def engineering(number: float) -> str:
     ids=["%.5f", "engineering", "single"],
 )
 def test_quaternions_of_random_signs_are_right_at_rounded_times_in_any_format(form, axes, tmp_path):
-    """The rod's centre, 0.5 m from the hinge, turns by 16 t rad; times are random, and q and -q are one
-    orientation. The table with a velocity of opposite sign is off."""
+    """The rod turns by 16 t rad, its centre is 0.5 m from the hinge, and times are random. Signs of
+    quaternions are, too, as q and -q are one orientation. With the opposite sign of a velocity, this column
+    is off."""
     rng, names = np.random.default_rng(4), [f"rod.orientation.{a}" for a in axes]
     times = np.sort(rng.uniform(0.0, 1.0, 30))
     sign, angle = rng.choice([-1.0, 1.0], 30), 16 * times

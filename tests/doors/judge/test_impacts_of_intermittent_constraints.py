@@ -64,7 +64,8 @@ DRAWN += [(conditional_mechanism, 2), (conditional_mechanism, 3)]
 
 @pytest.mark.parametrize(("make", "seed"), DRAWN)
 def test_random_impacts_of_mbref_balance_by_the_judge(make, seed):
-    """Momentum of each body and energy at each event; constraints of each piece between them."""
+    """The judge measures from the run alone how far each body's momentum and the energy are out of balance at
+    each event, and constraints are violated between the events: BALANCES are at most CLOSE."""
     scene = make(seed)
     run = mbref.simulate(scene, times=TIMES)
     found = measure(scene, run)
@@ -99,8 +100,8 @@ def test_both_formulations_of_the_reference_move_random_mechanisms_alike_through
 
 
 def test_wrong_impulse_velocity_and_energy_of_an_impact_are_measured_by_a_metric_each():
-    """An impulse is put off by a hundredth, a velocity after the latch or an energy by a tenth. The right
-    impact of mbref has errors of rounding."""
+    """An impulse is made larger by a hundredth, a velocity or an energy after the latch by a tenth. The
+    unchanged impact has errors of rounding."""
     scene, run = carts(), mbref.simulate(carts(), times=[0.0, 0.2, 0.5])
     latched = run.events[0]
     changes = {
@@ -111,9 +112,7 @@ def test_wrong_impulse_velocity_and_energy_of_an_impact_are_measured_by_a_metric
     assert all(measure(scene, run)[name] <= ROUNDING for name in changes)
     for name, change in changes.items():
         wrong = replace(run, events=(replace(latched, **change), *run.events[1:]))
-        assert (
-            measure(scene, wrong)[name] > 1e-3
-        )  # a tenth of the least change, relative to the largest value
+        assert measure(scene, wrong)[name] > 1e-3, name  # a tenth of the least change, 0.01
 
 
 # m, m/s, rad/s; five times the error of MuJoCo's steps of 1 ms with soft equalities

@@ -65,8 +65,8 @@ def machine(seed: int) -> Scene:
     ids=["disc", "armature", "gear", "both"],
 )
 def test_torque_of_a_driver_is_the_reduced_inertia_times_the_acceleration(scene, torque):
-    """M = (J + I + n² J) φ'' with n turns of the second disc; power M φ', kinetic energy M φ. The judge's
-    table is exact to rounding."""
+    """M = (J + I + n² J) φ'', as the second disc makes n turns in one of the first. The power is M φ', and
+    the work M φ is the kinetic energy. The judge's table is exact to rounding."""
     times = np.linspace(0.0, 1.0, 6)
     table = crosscheck.reference_table(scene, times)
     assert table["driver(A).torque"] == pytest.approx(torque, rel=1e-12)
@@ -108,7 +108,7 @@ def test_torque_that_lacks_the_armature_is_off_and_the_armature_is_named() -> No
 
 
 def test_torque_that_the_mechanism_does_not_determine_is_named_and_not_right(tmp_path, capsys):
-    """Two drivers move one freedom, and the table has the torque of one of them alone."""
+    """Two drivers move one freedom: only a sum of their torques is determined. The table has one of them."""
     scene = driven(ratio=-1.0)
     scene = scene.with_(driver=[*scene.driver, Driver(joint="B", polynomial=(0.0, 0.0, -RATE / 2))])
     scene.save(tmp_path / "scene.toml")

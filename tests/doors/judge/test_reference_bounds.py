@@ -28,7 +28,8 @@ CROSSING = ("two_crossings",)  # over two singular positions, where more digits 
     ],
 )
 def test_reference_of_a_hard_mechanism_is_within_its_bound_of_thirty_digits(name):
-    """Such as stiff springs, rows that are redundant up to rounding, and planes; bounds are at most 1e-12."""
+    """The truth is the same motion computed with thirty digits. HARD are mechanisms such as stiff springs and
+    rows that are redundant up to rounding. Bounds are at most 1e-12."""
     scene = HARD[name]()
     times = np.linspace(0.0, SHORTER.get(name, scene.duration), 5)
     a, second, b = runs(scene, times, SECONDS)
@@ -73,15 +74,15 @@ def test_least_squares_of_nearly_parallel_columns_lose_six_digits_alone():
 
 
 def drawn(seed: int, joint: str) -> Scene:
-    """A random mechanism with a torsion spring."""
+    """Return a random mechanism with a torsion spring in a joint."""
     scene = random_mechanism(seed)
     spring = TorsionSpring(joint=joint, stiffness=5.0, damping=0.1, natural_angle=0.3)
     return scene.with_(load=(*scene.load, spring))
 
 
 def test_formulations_agree_where_retained_rows_become_dependent():
-    """The rows that both formulations retain of redundant ones become dependent at 0.407 s, though the
-    mechanism is not singular; a step across this time would lose five digits of the motions, which agree to
+    """Of redundant rows each formulation retains independent ones. On this mechanism, which is not singular,
+    they become dependent at 0.407 s: a step across this time would lose five digits. The motions agree to
     1e-16 of the length."""
     scene, times = drawn(83, "J0"), np.linspace(0.0, 0.5, 3)
     a, b = (move(scene, times, EXTENDED, seconds=SECONDS) for move in (natural_motion, tree_motion))

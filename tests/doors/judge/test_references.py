@@ -97,7 +97,7 @@ def test_reference_agrees_with_the_closed_form_within_its_bound(name):
 
 @pytest.mark.parametrize("name", a_few(SMOOTH, 25, 3))
 def test_states_of_a_reference_do_not_depend_on_other_samples(name):
-    """The judge's states at the stored times equal the stored ones, though it computes six more samples."""
+    """The judge's states at the stored times equal the stored ones, though it is asked for six more times."""
     scene = MOTIONS[name]()
     times = np.union1d(times_of(scene), scene.duration * np.array([0.05, 0.11, 0.5, 0.52, 0.9, 0.99]))
     found = motion_of(scene, times)

@@ -23,7 +23,7 @@ SCENES = (
 )
 TURNING, OVER_TIME = "pendulum with torsion spring", "pendulum with force over time"
 SLIDING, BY_TABLE = "pendulum with slide spring", "pendulum with torque by a table"
-QUICK = {  # a scene or two for each relation that moves points, loads or functions of time
+QUICK = {  # relation of the conformance suite: scenes of its quick cases; all others are slow
     "rotated": (TURNING,),
     "mirrored": ("arm with universal", SLIDING),
     "scaled": ("pendulum with spring with damping",),

@@ -110,7 +110,8 @@ def test_a_shift_is_measured_in_lengths_of_the_mechanism(make, sample):
 @of_each_maker
 @pytest.mark.parametrize("angle", [1e-6, 0.02, 3.0])
 def test_a_rotation_is_measured_by_its_angle(make, angle):
-    """One body is turned at one sample; all quaternions have the opposite sign, which is no rotation."""
+    """The first body is turned (rad) at one sample. All quaternions change their sign, which is no
+    rotation."""
     _, _, exact = exact_of(make)
     orientation = exact.orientation.copy()
     orientation[4, 0] = rotations.multiply(rotations.from_vector(angle * AXIS), orientation[4, 0])
@@ -121,7 +122,8 @@ def test_a_rotation_is_measured_by_its_angle(make, angle):
 
 @pytest.mark.parametrize("late", [1e-5, 1e-4])
 def test_error_of_a_delayed_mechanism_is_its_largest_speed_times_the_delay(late):
-    """The relative tolerance is the change of speeds during the delay (s), at most a hundred delays."""
+    """A run that is late (s) is off by its speed times the delay. Meanwhile speeds change, by less than 100
+    of themselves per second: the relative tolerance is 100 delays."""
     scene, truth, exact = exact_of(double_hinge)
     times = exact.times[1:]
     delayed = replace(truth.poses(times - late), times=times)
@@ -242,7 +244,10 @@ def short_run(make) -> Trajectory:
     return truth_for(scene).poses(gate_times(scene))
 
 
-START = {  # field in the gate's sentence: array of the run, sample, length of the vector that is added
+# The gate compares poses, velocities and accelerations of two runs at the start, and changes of velocity to
+# the next sample: engines must simulate one mechanism. START has for each field that the gate can name the
+# array of the run, the sample, and the length of the vector that is added.
+START = {
     "initial position": ("position", 0, 1e-4),
     "initial velocity": ("velocity", 0, 1e-4),
     "initial angular velocity": ("angular_velocity", 0, 1e-4),
@@ -294,8 +299,9 @@ def test_gate_names_the_change_of_velocity_of_a_body_with_another_mass_or_inerti
 
 @pytest.mark.parametrize("sample", [0, 4, 8])
 def test_accelerations_that_are_wrong_from_a_sample_on_are_named_with_their_time(sample):
-    """50 m/s² are added from a sample on. Some of the nine samples are compared, the last one among them, so
-    the printed time may be up to two samples late. Its three digits round by less than 1 %."""
+    """``along`` compares accelerations with the judge's at the run's own states. 50 m/s² are added from a
+    sample on. Some of the nine samples are compared, the last one among them, so that the printed time may be
+    up to two samples late. Its three digits round by less than 1 %."""
     scene, _, exact = exact_of(double_hinge)
     assert along(scene, exact) is None
     off = np.where(np.arange(SAMPLES) >= sample, 50.0, 0.0)[:, None, None] * AXIS  # m/s²
