@@ -57,6 +57,7 @@ USERS = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="needs users of PO
 
 
 def test_file_is_read_as_it_was_written_and_nothing_else_is_left(tmp_path: Path):
+    """A file that was not written, b, is read as None."""
     checked_file.write(tmp_path / "new" / "a", b"data")
     assert checked_file.read(tmp_path / "new" / "a") == b"data"
     assert checked_file.read(tmp_path / "b") is None
@@ -196,7 +197,8 @@ def kernel_of(cache: Path) -> Path:
 
 @pytest.mark.parametrize("ahead", [-1e8, 5.0, 1e8])  # s: three years, or clocks that differ a little
 def test_damaged_code_of_a_kernel_is_removed_whatever_the_time_of_its_file(ahead, tmp_path: Path, capsys):
-    """Damage is found by a checksum. A whole file of that time stays."""
+    """Damage is found by a checksum: the file with the recorded bytes stays, and the one with other bytes
+    goes, though both have the same time, which is ``ahead`` of now."""
     disk_cache.begin(tmp_path)
     file = kernel_of(tmp_path)
     disk_cache.record_files(tmp_path)
@@ -225,7 +227,8 @@ def test_kernels_are_not_used_from_a_cache_in_which_others_can_write(place, tmp_
 @USERS
 @pytest.mark.slow
 def test_program_compiles_anew_beside_a_cache_in_which_others_can_write(tmp_path: Path):
-    """A count of 1 means that the kernel was compiled. With the old mode of its folder it is loaded again."""
+    """The program prints 7.0 and its number of compilations: 1 without a cache, 0 with one, 1 while others
+    can write in the cache's folder, and 0 with the old mode of the folder."""
     cache, script = tmp_path / "cache", SMALL_KERNEL + COUNT_COMPILATIONS
     assert [ran(script, tmp_path, cache)[0] for _ in range(2)] == ["7.0\n1\n", "7.0\n0\n"]
     for folder in (tmp_path, cache, *cache.iterdir()):
@@ -275,7 +278,7 @@ def test_program_runs_without_a_writable_cache(script, says, tmp_path: Path):
 
 
 def test_one_of_two_processes_compiles_a_kernel(tmp_path: Path):
-    """The number of compilations is printed by each: one compiles, the other waits and loads the result."""
+    """Each prints 7.0 and its number of compilations: one compiles, the other waits and loads the result."""
     cache, program = tmp_path / "cache", tmp_path / "program.py"
     program.write_text(SMALL_KERNEL.format(root=str(ROOT)) + COUNT_COMPILATIONS)
     command, env = [sys.executable, str(program)], compiling(cache)

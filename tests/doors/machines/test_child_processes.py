@@ -140,8 +140,8 @@ def test_signal_to_the_parent_ends_the_program_whose_exit_status_the_parent_retu
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["report", "compare"])
 def test_command_that_is_killed_leaves_no_process(command: str, log: Path, tmp_path: Path):
-    """Its processes have STILL_LOG in their environment. There are more than two: the command, the engine's
-    process and the program that the engine started."""
+    """The command's processes are found by STILL_LOG in their environment. There are three at least: the
+    command, the engine's process and the program that the engine started."""
     options = ["--out", str(tmp_path / "out")] if command == "report" else []
     resting().save(tmp_path / "resting.toml")
     asked = [command, str(tmp_path / "resting.toml"), "--engine", f"{ENGINES}:WAITS_WITH_A_PROGRAM", *options]
