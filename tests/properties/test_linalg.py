@@ -57,7 +57,8 @@ PSEUDO_INVERSES = {"svd": pinv_svd, "gram_schmidt": pinv_gram_schmidt}
 
 @st.composite
 def matrices(draw, most=40, condition=1e12):
-    """(matrix m x n, its rank): random orthogonal factors, singular values from 1 to 1/condition, then 0."""
+    """Return a matrix m × n, its rank, and its singular values that are not zero, from 1 to 1/condition; its
+    orthogonal factors are random."""
     m, n = draw(st.integers(1, most)), draw(st.integers(1, most))
     rank = draw(st.integers(1, min(m, n)))
     exponents = draw(st.floats(0, np.log10(condition)))
@@ -69,6 +70,7 @@ def matrices(draw, most=40, condition=1e12):
 
 
 def norm(a):
+    """Return the largest singular value of a matrix, or the length of a vector."""
     return np.linalg.norm(a, 2)
 
 
@@ -103,9 +105,9 @@ def test_pseudo_inverse_has_the_four_penrose_properties(name, case, noise, seed)
 )
 @given(data=st.data())
 def test_full_pivoting_finds_the_rank_and_independent_rows(condition, noise, tolerance, data):
-    """The rank is known by construction: singular values from 1 to 1/condition, then zeros, below the
-    tolerance also with noise in the entries. Rounding must not choose dependent rows: the least singular
-    value of the chosen block is at least a thousandth of the matrix's."""
+    """The rank is known by construction: singular values are from 1 to 1/condition, or zero, and noise in the
+    entries makes zeros no larger than the tolerance. The chosen rows and columns are independent: the least
+    singular value of their block is at least a thousandth of the matrix's."""
     d, rank, values = data.draw(matrices(condition=condition))
     m, n = d.shape
     rows, columns = np.zeros(m, dtype=np.int64), np.zeros(n, dtype=np.int64)
@@ -117,8 +119,8 @@ def test_full_pivoting_finds_the_rank_and_independent_rows(condition, noise, tol
 
 @given(case=matrices(condition=1e6))
 def test_least_norm_solution_by_qr_equals_numpys_least_squares_solution_by_svd(case):
-    """For consistent equations of any rank. The relative difference is below 30 ε max(m, n) κ, κ the largest
-    over the least singular value that is not zero."""
+    """Equations are consistent and of any rank. The relative difference is below RATIO, 30, times
+    ε max(m, n) κ, where κ is the largest over the least singular value that is not zero."""
     d, rank, values = case
     m, n = d.shape
     rhs = d @ np.random.default_rng(3).normal(size=n)
@@ -129,13 +131,9 @@ def test_least_norm_solution_by_qr_equals_numpys_least_squares_solution_by_svd(c
     assert found == rank
     minimum_norm(found, memory.argument)
     exact = np.linalg.lstsq(d, rhs, rcond=1e-10)[0]
-    error = norm_of(x - exact) / norm_of(exact)
+    error = norm(x - exact) / norm(exact)
     unit = np.finfo(float).eps * max(m, n) * values[0] / values[-1]
     assert error < RATIO * unit, f"relative difference {error:.1e}"
-
-
-def norm_of(v):
-    return np.linalg.norm(v)
 
 
 @given(n=st.integers(1, 30), seed=st.integers(0, 2**32 - 1))
@@ -148,18 +146,19 @@ def test_lu_and_cholesky_solve_to_rounding_times_the_condition(n, seed):
     b, lu, pivots = a @ x, a.copy(), np.zeros(n, dtype=np.int64)
     assert lu_factor(lu, n, pivots, 0.0)
     lu_solve(lu, n, pivots, b)
-    assert norm_of(b - x) < 1e-12 * np.linalg.cond(a) * norm_of(x)
+    assert norm(b - x) < 1e-12 * np.linalg.cond(a) * norm(x)
     spd = a @ a.T
     b, factor = spd @ x, spd.copy()
     assert cholesky_factor(factor, n)
     cholesky_solve(factor, n, b)
-    assert norm_of(b - x) < 1e-12 * np.linalg.cond(spd) * norm_of(x)
+    assert norm(b - x) < 1e-12 * np.linalg.cond(spd) * norm(x)
 
 
 @given(n=st.integers(1, 30), seed=st.integers(0, 2**32 - 1), scale=st.integers(-140, 140))
-def test_sign_and_logarithm_of_a_determinant_are_numpy_s(n, seed, scale):
-    """Of random matrices with factors of 1e-140 to 1e140, and of random pivots: their product may be beyond
-    the largest double. Logarithms agree to rounding times condition and size."""
+def test_sign_and_logarithm_of_a_determinant_are_numpys(n, seed, scale):
+    """`determinant` has the sign and logarithm of slogdet for matrices with factors of 1e-140 to 1e140, whose
+    determinant may be beyond the largest double; so has `product_of_pivots` for a triangular matrix, whose
+    pivots are random. Logarithms agree to rounding times condition and size."""
     rng = np.random.default_rng(seed)
     a = rng.normal(size=(n, n))
     sign, size = np.linalg.slogdet(a)
