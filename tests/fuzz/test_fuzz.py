@@ -22,7 +22,7 @@ def test_mutated_scene_is_accepted_or_refused_with_a_scene_error(target, count, 
 
 def test_random_command_line_ends_with_a_documented_status_and_message(tmp_path, monkeypatch):
     """28 seeds draw command lines. Documented are the statuses 0, 1, 2 and 130. A traceback, or a file
-    that is left behind, is a defect. More than 10 commands and statuses are met."""
+    that is left behind, is a defect. More than 10 pairs of command and status are met."""
     monkeypatch.chdir(tmp_path)
     short = [seed for seed in range(1000, 1028) if drawn_command(random.Random(seed)).name not in LENGTHY]
     cases = {seed: targets.case("command_line", seed) for seed in short}

@@ -83,7 +83,7 @@ def test_at_most_60_lines_are_kept_from_the_formatter():
 
 
 def test_file_has_a_docstring_of_more_than_ten_characters():
-    """The first line counts: less than 10 characters say nothing."""
+    """The first line counts: ten characters say nothing."""
     first = {name(path): (ast.get_docstring(parsed(path)) or "").partition("\n")[0] for path in FILES}
     assert not [path for path, line in first.items() if len(line) <= 10]
 

@@ -33,7 +33,7 @@ def test_page_begins_with_a_sentence_and_shows_code_or_a_picture_in_30_lines(pat
         ("One | cell told | here\n", [1]),
         ("Word " * 37 + ".\n", [1]),
         (("Word " * 30 + ".\n") * 3, []),
-        ("It is very unique.\n", [1, 1]),
+        ("It is very unique.\n", [1, 1]),  # by two rules of proselint
     ],
 )
 def test_faults_of_prose_are_found_with_their_lines(text, lines):

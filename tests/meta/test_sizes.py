@@ -9,7 +9,7 @@ import pytest
 from tests.meta.imports import sources, statements
 
 PACKAGES = ("mbref", "crosscheck", "reports")
-MEDIAN, MOST, SHARE = 7, 20, 0.9  # lines of a function's body, and how many have at most MOST
+MEDIAN, MOST, SHARE = 7, 20, 0.9  # lines of a function's body; SHARE of the functions have at most MOST
 
 
 def body_lines(function: ast.FunctionDef) -> int:
