@@ -144,14 +144,13 @@ def test_darts_own_hinge_closure_moves_a_turned_copy_as_the_original() -> None:
 
 
 def test_every_engine_but_mbref_runs_the_copies() -> None:
-    """WAYS has the engines of these tests; mbref's copies are tested elsewhere, by properties of
-    mechanisms."""
+    """WAYS has the engines of these tests; mbref's copies are in tests of properties of mechanisms."""
     assert {"mbref", *(name for name, _ in WAYS.values())} == set(engine_names())
 
 
 def test_the_copies_cut_the_loop_at_each_of_its_joints() -> None:
-    """The adapters cut a loop at one joint, the closure of their spanning tree. Over the four-bar and its
-    copies in other orders, every joint is a closure."""
+    """The adapters cut a loop at one joint, the closure of their spanning tree. Each joint is the cut of the
+    four-bar or of one of its copies in other orders."""
     scene, exact = four_bar()
     cuts = {scene.joint[spanning_tree(scene).closures[0].joint].name}
     for name, relation in COPIES.items():
