@@ -111,16 +111,16 @@ def reactions(
     joints, by default within half a turn.
     """
     names = tuple(joint.name for joint in model.scene.joint)
-    if not names:
-        return {}
-    body, side, of, starts = _places(model.structure, names)
+    held = [j for j, name in enumerate(names) if name in model.structure.row_joint]
+    body, side, of, starts = _places(model.structure, tuple(names[j] for j in held))
     rows, sign = np.arange(of.size), np.where(side == 1, -1.0, 1.0)[of]
     pulls = blocks.reshape(len(q), model.m, model.structure.sides, 6)[:, rows, side[of]]
     wrench = np.add.reduceat((sign * multipliers[:, rows])[..., None] * pulls, starts, axis=1)
     pose, force = q[:, body], wrench[..., :3]  # about the centre of mass, moments in body axes
-    arm = model.anchors(q) - pose[..., :3]
+    arm = model.anchors(q)[:, held] - pose[..., :3]
     moment = rotations.rotate(pose[..., 3:], wrench[..., 3:]) - rotations.cross(arm, force)
-    found = np.concatenate([force, moment], axis=-1)
+    found = np.zeros((len(q), len(names), 6))  # joints without rows have no reaction
+    found[:, held] = np.concatenate([force, moment], axis=-1)
     _add_coupled(model, q, multipliers, names, found, angles)
     return {name: found[:, j] for j, name in enumerate(names)}
 
@@ -183,9 +183,10 @@ def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray]:
     Theor. Appl. Mech. 43, 2005). The argument ``blocks`` (k, m, 12) contains Φ_q.
     """
     vanishing, _ = vanishing_combinations(model, blocks)
-    names = tuple(joint.name for joint in model.scene.joint)
-    _, _, of, starts = _places(model.structure, names)
-    rows = {name: slice(*pair) for name, pair in zip(names, pairwise([*starts, of.size]), strict=True)}
+    rows = dict.fromkeys((joint.name for joint in model.scene.joint), slice(0))  # joints without rows
+    held = tuple(name for name in rows if name in model.structure.row_joint)
+    _, _, of, starts = _places(model.structure, held)
+    rows |= {name: slice(*pair) for name, pair in zip(held, pairwise([*starts, of.size]), strict=True)}
     for d, driver in enumerate(model.scene.driver):
         row = int(model.structure.row[model.structure.driver == d][0])
         rows[DRIVER.format(driver.joint)] = slice(row, row + 1)
@@ -254,7 +255,7 @@ class JointPlaces(NamedTuple):
 
 @functools.lru_cache(maxsize=MOST_KEPT)
 def _places(structure: Structure, names: tuple[str, ...]) -> JointPlaces:
-    """Return the places of the named joints, which are the first joints in the structure."""
+    """Return the places of the named joints, which are the first joints with rows in the structure."""
     number = {name: j for j, name in enumerate(names)}
     of = np.array([number[name] for name in structure.row_joint if name in number], dtype=int)
     starts = np.searchsorted(of, np.arange(len(names)))

@@ -10,7 +10,7 @@ import numpy as np
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Joint, Scene
-from mbref.scene.joints import ANGLE, Coordinate
+from mbref.scene.joints import ANGLE, DISPLACEMENT, Coordinate
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class JointMotion:
         Angle about the axis (rad, full turns counted) and its rate (rad/s), of revolute, cylindrical and
         planar joints. NaN where samples of an engine that counts no turns are too far apart to count them.
     displacement, displacement_rate : ndarray, shape (k,), or None
-        Displacement along the axis, m, and its rate, m/s, of translational and cylindrical joints.
+        Displacement along the axis, m, and its rate, m/s, of sliding joints and of joints of type free.
     rotation : ndarray, shape (k, 3)
         Rotation vector of the second body relative to the first, rad, along the world's axes at t = 0 as they
         are fixed to the first body.
@@ -67,7 +67,7 @@ def joint_motion(scene: Scene, motion: Trajectory, name: str) -> JointMotion:
     joint = scene.joint_named(name)
     turned = [turned_since_start(scene, motion, body) for body in joint.bodies]
     relative = rotations.multiply(rotations.conjugate(turned[0]), turned[1])
-    slides = joint.facts.free_translations == 1 and bool(joint.directions)
+    slides = DISPLACEMENT in joint.facts.coordinates
     angle, rate = _angle(scene, motion, joint, turned[0], relative) if joint.facts.turns else (None, None)
     slid, speed = _displacement(scene, motion, joint, turned[0]) if slides else (None, None)
     wrench = (motion.reactions or {}).get(name)

@@ -1,4 +1,4 @@
-"""Bodies and drivers as data: rigid bodies, and prescribed motions of joints."""
+"""Bodies and drivers as data: rigid bodies, and prescribed motions of joints and of points."""
 
 from __future__ import annotations
 
@@ -22,12 +22,14 @@ from mbref.scene.fields import (
     VectorValue,
     as_list,
     checked_mass,
+    direction,
 )
 from mbref.scene.functions import TimeFunction
 from mbref.scene.shapes import Solid
 from mbref.scene.units import number_in
 from mbref.scene.validation import checked_inertia
 
+OF_POINT = ("name", "body", "point", "along")  # fields of a driver of a point
 DRIVER = "driver({})"  # name of the driver of a joint in columns and records
 UNIT_TOLERANCE = 1e-6  # largest deviation of a quaternion from unit length that counts as rounding
 START_ROUNDING = 1e-12  # value of a driver at t = 0 / its largest term, or 1 m or rad, that is rounding
@@ -94,11 +96,34 @@ class Driver(TimeFunction):
     """Prescribed motion of the second body of ``joint`` relative to the first, from t = 0.
 
     value(t) = c0 + c1 t + c2 t² + … + sine + table: the angle of a revolute or cylindrical joint about its
-    axis (rad), or the displacement of a translational one along it (m).  value(0) must be zero.
+    axis (rad), or the displacement of a translational or free one along it (m).  value(0) must be zero.
+    In place of a joint, a ``name``, a ``body``, its ``point`` (world at t = 0) and a world direction
+    ``along`` prescribe the displacement of a point; a read scene has a free joint in their place.
     """
 
-    joint: Name
+    name: Name | None = None
+    body: Name | None = None
+    point: PointValue | None = None
+    along: VectorValue | None = None
+    joint: Annotated[Name, Field(validate_default=True)] = ""
     polynomial: Annotated[Measures, Field(validate_default=True)] = (0.0,)
+
+    @field_validator("along")
+    @classmethod
+    def _has_a_direction(cls, along: VectorValue | None) -> VectorValue | None:
+        return along if along is None else direction(along)
+
+    @field_validator("joint", mode="before")
+    @classmethod
+    def _joint_or_point(cls, joint: Any, info: ValidationInfo) -> Any:
+        """Return the name of the joint, or of the driven point; a faulty field counts as given."""
+        given = [field for field in OF_POINT if info.data.get(field, field) is not None]
+        missing = [field for field in OF_POINT if field not in given]
+        if joint and given:
+            raise ValueError(f"or a driven point, not both; got {given[0]}, too")
+        if joint or not missing:
+            return joint or info.data.get("name")
+        raise ValueError("is required" + f", or {', '.join(missing)} of the driven point" * bool(given))
 
     @field_validator("polynomial")
     @classmethod

@@ -75,7 +75,8 @@ class JointFacts:
     def coordinates(self) -> tuple[Coordinate, ...]:
         """Joint coordinates that can be coupled: the angle about the axis, the displacement along it."""
         angle = (ANGLE,) if self.turns else ()
-        return angle + ((DISPLACEMENT,) if self.forbidden_translations == (X, Y) else ())
+        slides = self.forbidden_translations == (X, Y) or self.driven == DISPLACEMENT
+        return angle + ((DISPLACEMENT,) if slides else ())
 
     @property
     def main(self) -> Coordinate:
@@ -239,6 +240,14 @@ class Inline(_AxisJoint):
     type: Literal["inline"] = "inline"
 
 
+class Free(_AxisJoint):
+    """No constraint: a driver, a load or a coupling acts on the displacement of the second body's ``anchor``
+    along ``axis`` of the first body."""
+
+    facts = JointFacts(driven="displacement", loaded=(DISPLACEMENT,))
+    type: Literal["free"] = "free"
+
+
 class Distance(JointEntry):
     """Constant distance between two ``anchors`` (first on the first body, second on the second)."""
 
@@ -259,7 +268,16 @@ class Distance(JointEntry):
 
 
 Joint = Annotated[
-    Fixed | Revolute | Universal | Spherical | Translational | Cylindrical | Planar | Inline | Distance,
+    Fixed
+    | Revolute
+    | Universal
+    | Spherical
+    | Translational
+    | Cylindrical
+    | Planar
+    | Inline
+    | Free
+    | Distance,
     Discriminator("type"),
 ]
 JOINT_TYPES: dict[str, type[Joint]] = {

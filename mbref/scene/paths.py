@@ -57,7 +57,7 @@ def _place(entries: tuple[Any, ...], step: str, path: str) -> int:
     """Return the index for a step of a path: a number, or the name of the entry (for a driver its joint's
     name)."""
     tables = [*map(_fields_of, entries)]
-    names = [table.get("name", table.get("joint")) for table in tables]
+    names = [table.get("name") or table.get("joint") for table in tables]
     if step in names:
         return names.index(step)
     if step.isdigit() and int(step) < len(entries):

@@ -9,12 +9,12 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError, model_validator
 
 from mbref.files import write
-from mbref.scene.bodies import Body, Driver
+from mbref.scene.bodies import OF_POINT, Body, Driver
 from mbref.scene.conditions import Release, When
 from mbref.scene.couplings import Coupling
 from mbref.scene.fields import Acceleration, EntryType, LaterTime, Name, SceneEntry, Three
 from mbref.scene.functions import Factor, Sine
-from mbref.scene.joints import Coordinate, Joint
+from mbref.scene.joints import Coordinate, Free, Joint
 from mbref.scene.loads import Load
 from mbref.scene.paths import replaced_at
 from mbref.scene.stops import Stop
@@ -45,7 +45,7 @@ class Scene(SceneEntry):
     coupling : tuple of Coupling
         Linear relations of joint coordinates.
     driver : tuple of Driver
-        Prescribed motions of joints.
+        Prescribed motions of joints; of a point, as motion of a joint of type free.
     load : tuple of Load
         Forces, moments, springs and dampers.
     """
@@ -75,8 +75,20 @@ class Scene(SceneEntry):
                 faults.setdefault(path, message)
         if faults or scene is None:
             raise SceneError(list(named_paths(data if isinstance(data, Mapping) else {}, faults)))
+        scene.__dict__.update(scene._with_free_joints())
         scene.__dict__.update(scene._repeated(scene.duration))
         return scene
+
+    def _with_free_joints(self) -> dict[str, Any]:
+        """Return the fields in which driven points have free joints."""
+        points = [driver for driver in self.driver if driver.point is not None]
+        free = [
+            Free(name=each.joint, bodies=(GROUND, each.body), anchor=each.point, axis=each.along)
+            for each in points
+        ]
+        no_point = dict.fromkeys(OF_POINT)
+        driver = tuple(each.model_copy(update=no_point) if each in points else each for each in self.driver)
+        return {"joint": (*self.joint, *free), "driver": driver} if points else {}
 
     def _repeated(self, until: float) -> dict[str, Any]:
         """Return the fields in which periodic tables are too short for a time (s), with more periods."""

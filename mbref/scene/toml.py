@@ -84,7 +84,9 @@ def _names(text: str, lines: Sequence[Line]) -> dict[tuple[str, str], int]:
     joint."""
     rows, found = text.splitlines(), dict[tuple[str, str], int]()
     for number, table, place, key in lines:
-        if key == ("joint" if table == "driver" else "name") and (name := NAME.match(rows[number - 1])):
+        if key in (("joint", "name") if table == "driver" else ("name",)) and (
+            name := NAME.match(rows[number - 1])
+        ):
             found.setdefault((table, name[1]), place)
     return found
 

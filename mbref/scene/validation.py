@@ -11,8 +11,9 @@ import numpy as np
 from pydantic import ValidationError
 
 from mbref.printable import printable
+from mbref.scene.body_faults import mass_faults
 from mbref.scene.coupling_faults import coordinate_faults, count_faults
-from mbref.scene.fields import checked_length, checked_size, field_of, is_some, meant, shown
+from mbref.scene.fields import checked_length, checked_size, field_of, meant, shown
 from mbref.scene.function_faults import Faults, factor_faults, listed, table_faults, unit_faults
 from mbref.scene.interval_faults import condition_faults, interval_faults
 from mbref.scene.joints import JOINT_TYPES
@@ -155,7 +156,8 @@ def named_paths(data: Mapping[str, Any], faults: Mapping[str, str]) -> Iterator[
 def _own_name(data: Mapping[str, Any], key: str, place: int) -> str:
     """Return the name of an entry if no other entry has it and a path can contain it; otherwise an empty
     text."""
-    names = [_text(entry, "joint" if key == "driver" else "name") for entry in _entries(data, key)]
+    fields = ("joint", "name") if key == "driver" else ("name",)
+    names = [next(filter(None, (_text(entry, f) for f in fields)), "") for entry in _entries(data, key)]
     name = names[place] if place < len(names) else ""
     fits_a_path = not name.isdigit() and not set(name) & set("[]") and len(name) < 80 and name.isprintable()
     return name if fits_a_path and names.count(name) == 1 else ""
@@ -196,11 +198,13 @@ def reference_faults(data: Mapping[str, Any]) -> Faults:
     yield from _duplicates("body", _names(bodies), reserved=RESERVED)
     yield from _duplicates("joint", _names(joints), (GROUND,) if data.get("ground") == "body" else ())
     for i, body in enumerate(bodies):
-        yield from _mass_faults(f"body[{i}]", body)
+        yield from mass_faults(f"body[{i}]", body)
     known = {*_names(bodies), GROUND}
     for i, joint in enumerate(joints):
         yield from _pair_faults(f"joint[{i}].bodies", field_of(joint, "bodies"), known)
     types = {_text(joint, "name"): _text(joint, "type") for joint in joints}
+    yield from _point_faults(data, types, known)
+    types |= {_text(driver, "name"): "free" for driver in _entries(data, "driver") if _text(driver, "name")}
     yield from _coupling_faults(data, types)
     yield from _driver_faults(data, types)
     yield from interval_faults(data)
@@ -221,25 +225,6 @@ def reference_faults(data: Mapping[str, Any]) -> Faults:
                 f"load[{i}].joint", field_of(load, "joint"), types, LOADED[kind], f"carry a {kind}"
             )
         yield from factor_faults(f"load[{i}].factor", field_of(load, "factor"), data)
-
-
-def _mass_faults(path: str, body: Any) -> Faults:
-    """Yield mass, inertia, shape and density of a body that are missing, or contradict each other."""
-    mass, inertia, shape, density = (field_of(body, key) for key in ("mass", "inertia", "shape", "density"))
-    if shape is None and density is not None:
-        yield f"{path}.shape", "is missing; a density needs a shape"
-    elif shape is not None and inertia is not None:
-        yield f"{path}.inertia", "follows from the shape; give one of them"
-    elif shape is not None and (mass is None) == (density is None):
-        wrong = "is missing; a shape needs mass or density" if mass is None else "or density, not both"
-        yield f"{path}.mass", wrong
-    elif density is not None and field_of(shape, "type") == "rod":
-        yield f"{path}.density", "needs a volume, which a thin rod has not; give its mass, or use a cylinder"
-    elif shape is None and (mass is None) != (inertia is None):
-        missing = "inertia" if inertia is None else "mass"
-        yield f"{path}.{missing}", "is missing; give mass and inertia, or neither (kinematics)"
-    elif mass == 0 and is_some(inertia):
-        yield f"{path}.mass", "is 0, but the inertia is not; a massless link has neither"
 
 
 def _coupling_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
@@ -276,15 +261,27 @@ def _condition_faults(data: Mapping[str, Any], types: Mapping[str, Any], known: 
             yield from condition_faults(path, entry, types)
 
 
+def _point_faults(data: Mapping[str, Any], types: Mapping[str, Any], known: set[str]) -> Faults:
+    """Yield driven points of unknown bodies, or with the name of a joint."""
+    for i, driver in enumerate(_entries(data, "driver")):
+        if (name := _text(driver, "name")) in types and name:
+            yield f"driver[{i}].name", f"{name!r} is already the name of a joint"
+        if (body := _text(driver, "body")) == GROUND:
+            yield f"driver[{i}].body", "a point of the ground cannot be driven"
+        elif body and body not in known:
+            yield f"driver[{i}].body", _unknown("body", body, known - {GROUND})
+
+
 def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
     """Yield drivers of unknown or wrong joints, and second drivers of a joint."""
     driven: set[str] = set()
     for i, driver in enumerate(_entries(data, "driver")):
-        name = field_of(driver, "joint")
-        yield from _joint_faults(f"driver[{i}].joint", name, types, DRIVABLE, "be driven")
+        field = "joint" if _text(driver, "joint") else "name"
+        name = field_of(driver, field)
+        yield from _joint_faults(f"driver[{i}].{field}", name, types, DRIVABLE, "be driven")
         if isinstance(name, str):
             if name in driven:
-                yield f"driver[{i}].joint", f"{name!r} already has a driver"
+                yield f"driver[{i}].{field}", f"{name!r} already has a driver"
             driven.add(name)
             yield from unit_faults(f"driver[{i}]", driver, types.get(name))
         yield from table_faults(f"driver[{i}].table", driver, data, 0.0, math.inf)

@@ -144,6 +144,10 @@ DRIVERS: dict[str, list[Entry]] = {
         {"joint": "A", "table": [[0.0, 0.0], [0.1, 0.2], [0.2, 0.5], [0.3, 0.4], [0.4, 0.0]]}
     ],
     "angle of the second joint": [{"joint": "B", "polynomial": [0.0, -5.0, 2.0]}],
+    "point along a direction": [
+        {"name": "D", "body": "b", "point": [1.0, 0.5, 0.1], "along": [3.0, 0.0, -4.0]}
+        | {"polynomial": [0.0, -0.4, 1.5], "sine": {"amplitude": 0.05, "frequency": 9.0}}
+    ],
     "both angles": [{"joint": "A", "polynomial": [0.0, 2.0]}, {"joint": "B", "polynomial": [0.0, 0.0, 6.0]}],
 }
 for _name, _driver in DRIVERS.items():
@@ -160,6 +164,37 @@ def driven_slide() -> Scene:
     ]
     driver = [{"joint": "A", "polynomial": [0.0, 0.0, 1.5], "sine": {"amplitude": 0.05, "frequency": 12.0}}]
     return made("driven slide", bodies, joints, driver=driver)
+
+
+@motion
+def driven_between_bodies() -> Scene:
+    """Return two blocks on hinges; a table drives a point of the second along an axis that the first carries,
+    where a spring and a force act, too."""
+    bodies = [block("a", (0.4, 0.1, -0.1)), block("b", (0.8, 0.4, 0.2), 0.7)]
+    joints = [
+        hinge("A", "ground", "a", (0.0, 0.0, 0.0), SKEW),
+        hinge("B", "ground", "b", (1.0, 0.0, 0.0), Y),
+        joint("D", "free", "a", "b", (0.9, 0.5, 0.3), axis=[1.0, 2.0, 2.0]),
+    ]
+    rows = [[0.0, 0.0], [0.1, 0.05], [0.2, -0.02], [0.3, -0.1], [0.4, 0.0]]
+    along = [
+        load("slide_spring", joint="D", stiffness=40.0, damping=2.0),
+        load("joint_force", joint="D", force=3.0),
+    ]
+    return made("driven between bodies", bodies, joints, driver=[{"joint": "D", "table": rows}], load=along)
+
+
+@motion
+def coupled_point() -> Scene:
+    """Return two blocks on hinges; a point of the second moves along an axis by the angle of the first."""
+    bodies = [block("a", (0.4, 0.1, -0.1)), block("b", (0.8, 0.4, 0.2), 0.7)]
+    joints = [
+        hinge("A", "ground", "a", (0.0, 0.0, 0.0), SKEW),
+        hinge("B", "ground", "b", (1.0, 0.0, 0.0), Y),
+        joint("D", "free", "ground", "b", (0.9, 0.5, 0.3), axis=[1.0, 2.0, -2.0]),
+    ]
+    coupling = [{"name": "C", "joints": ["D", "A"], "ratio": 0.4}]
+    return made("coupled point", bodies, joints, coupling=coupling)
 
 
 # Couplings and armatures.

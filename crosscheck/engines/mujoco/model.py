@@ -32,7 +32,6 @@ from crosscheck.refusals import FACTOR, TABLE
 from mbref import rotations
 from mbref.scene import (
     GROUND,
-    JOINT_TYPES,
     Coupling,
     Driver,
     Factor,
@@ -46,7 +45,11 @@ from mbref.scene import (
 
 POWERS = 4  # of the polynomial in MuJoCo's equality of two joints
 SUPPORTS = replace(
-    EVERYTHING, joints=tuple(JOINT_TYPES), over_time=(TABLE, FACTOR), massless_links=True, powers=POWERS
+    EVERYTHING,
+    joints=(*EVERYTHING.joints, "inline"),
+    over_time=(TABLE, FACTOR),
+    massless_links=True,
+    powers=POWERS,
 )
 COUPLING = "coupling "  # prefix of the names of equalities that are couplings
 SWITCHED = "switched "  # prefix of the names of equalities that are joints with intervals, and of their sites

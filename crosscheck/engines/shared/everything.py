@@ -6,7 +6,7 @@ from crosscheck.refusals import FACTOR, Supports
 from mbref.scene import JOINT_TYPES, LOAD_TYPES
 
 EVERYTHING = Supports(
-    joints=tuple(kind for kind in JOINT_TYPES if kind != "inline"),
+    joints=tuple(kind for kind in JOINT_TYPES if kind not in ("inline", "free")),
     drivers=("angle", "displacement"),
     loads=tuple(LOAD_TYPES),
     couplings=("angle", "displacement"),

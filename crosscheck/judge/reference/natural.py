@@ -20,6 +20,7 @@ from crosscheck.judge.arithmetic import Arithmetic, doubles
 from crosscheck.judge.reference.natural_joints import JointCoordinates
 from crosscheck.judge.reference.start_velocities import given
 from mbref.scene import Body, Driver, Scene
+from mbref.scene.joints import DISPLACEMENT
 
 PERPENDICULAR = {
     "fixed": ((1, 2), (0, 2), (0, 1)),
@@ -29,7 +30,7 @@ PERPENDICULAR = {
     "planar": ((1, 2), (0, 2)),
 }
 """Axes of the joint's frame on the first and on the second body that stay perpendicular, by type."""
-SLIDING = {"translational": (0, 1), "cylindrical": (0, 1), "planar": (2,), "inline": (0, 1)}
+SLIDING = {"translational": (0, 1), "cylindrical": (0, 1), "planar": (2,), "inline": (0, 1), "free": ()}
 """Axes of the first body's frame along which the anchors do not part; all three of the world's elsewhere."""
 EYE = np.eye(3)
 RIGHT_ANGLE = 1e-15  # cosine of axes that are perpendicular to the rounding of their numbers
@@ -190,7 +191,7 @@ class NaturalCoordinates:
             if joint.type == "universal":
                 yield self._cross(joint)
             if joint.name in drivers:
-                yield self._driven(joint.type, drivers[joint.name], e, f, apart)
+                yield self._driven(joint.facts.driven, drivers[joint.name], e, f, apart)
 
     def _world(self) -> list[np.ndarray]:
         return [self._axis(-1, i) for i in range(3)]
@@ -210,11 +211,11 @@ class NaturalCoordinates:
         return Row(self.direction(first, a), self.direction(second, b), (a * b).sum())
 
     def _driven(
-        self, kind: str, driver: Driver, e: Sequence[np.ndarray], f: Sequence[np.ndarray], apart: np.ndarray
+        self, kind: Any, driver: Driver, e: Sequence[np.ndarray], f: Sequence[np.ndarray], apart: np.ndarray
     ) -> Row:
-        """Return the row of a driven angle ψ: the first axis on the second body is perpendicular to cos ψ e₂
-        - sin ψ e₁."""
-        if kind == "translational":
+        """Return the row of a driven displacement, or of a driven angle ψ: the first axis on the second body
+        is perpendicular to cos ψ e₂ - sin ψ e₁."""
+        if kind == DISPLACEMENT:
             return Row(e[2], apart, 0.0, driver)
         return Row(e[1], f[0], 0.0, driver, -1 * e[0])
 

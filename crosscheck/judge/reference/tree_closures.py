@@ -19,7 +19,7 @@ from crosscheck.judge.reference.vectors import apply, cross, dot, unit
 
 # value, first rate, and second rate without joint accelerations (K, m, 3)
 Carried = tuple[np.ndarray, np.ndarray, np.ndarray]
-SLIDING = {"translational": (0, 1), "cylindrical": (0, 1), "planar": (2,), "inline": (0, 1)}
+SLIDING = {"translational": (0, 1), "cylindrical": (0, 1), "planar": (2,), "inline": (0, 1), "free": ()}
 """Numbers of the directions (two normal to the axis, the axis) that nothing may slide along; else all."""
 ALL, TILTS = ((1, 2), (0, 2), (0, 1)), ((2, 0), (2, 1))
 LOCKED = {"fixed": ALL, "translational": ALL, "revolute": TILTS, "cylindrical": TILTS, "planar": TILTS}

@@ -258,7 +258,7 @@ def _fits(scene: Scene, path: Path) -> bool:
     if not np.isfinite(pose.position).all() or not np.isfinite(pose.rotation).all():
         return False
     residuals = constraints.closure(undriven, np.zeros(len(PROBES)), pose.position, orientation)
-    gap = max((np.abs(r).max() for r in residuals.values()), default=0.0)
+    gap = max((np.abs(r).max(initial=0.0) for r in residuals.values()), default=0.0)
     freedoms = freedoms_at(undriven, pose.position[1].astype(float), orientation[1])
     return gap <= ON_PATH * max(length, 1.0) and freedoms == 1
 

@@ -55,7 +55,10 @@ class Stage(NamedTuple):
 
 
 def ground_mark(stage: Stage, joint: Joint) -> Iterator[str]:
-    """Return a hatched triangle below a joint to the ground, or a dashed guide for a sliding joint."""
+    """Return a hatched triangle below a joint to the ground, or a dashed guide for a sliding joint; nothing
+    for a joint that constrains nothing."""
+    if not joint.facts.rows:
+        return
     side = joint.bodies.index(GROUND)
     point = joint.anchor_pair[side]
     if joint.facts.free_translations == 1 and joint.directions:
@@ -93,7 +96,7 @@ def joint_mark(stage: Stage, joint: Joint) -> Iterator[str]:
         body, point = (names[k], joint.anchor_pair[k]) if len(joint.directions) > 1 else (names[1], second)
         if sliding:
             yield from _sleeve(stage, body, point, axis)
-        elif abs(axis @ stage.page.view.axes[2]) < 1 - 1e-9 and joint.type not in ("planar", "inline"):
+        elif abs(axis @ stage.page.view.axes[2]) < 1 - 1e-9 and joint.type not in HIDDEN_AXES:
             ends = stage.along(body, point, axis, STUB)
             yield stage.line(ends, f'stroke="{INK}" stroke-width="1.2" stroke-dasharray="7 2 1 2"')
     if joint.type == "planar":
@@ -123,6 +126,7 @@ def _ball(fill: str, radius: float = 5.5) -> str:
     return f'<circle r="{radius:g}" fill="{fill}" stroke="{INK}" stroke-width="1.8"/>'
 
 
+HIDDEN_AXES = ("planar", "inline", "free")  # types of joints whose axes are not drawn as a dashed line
 SIGNS = {
     "fixed": f'<rect x="-5.5" y="-5.5" width="11" height="11" fill="{INK}"/>',
     "revolute": _ball(PAPER),
@@ -132,6 +136,7 @@ SIGNS = {
     "cylindrical": _ball(PAPER, 4),
     "planar": _ball(GREY, 4),
     "inline": _ball(INK, 3.5),
+    "free": _ball(ACTION, 3.5),
     "distance": _ball(PAPER, 3.5),
 }
 

@@ -102,7 +102,7 @@ def test_every_number_may_have_a_unit_except_directions_and_pure_numbers():
         if '"number"' in json.dumps(kind) and '"string"' not in json.dumps(kind)
     }
     axes = {f"{joint.__name__}.{field}" for joint in JOINT_TYPES.values() for field in joint.model_fields}
-    pure = {"Body.orientation", "Factor.polynomial", "Stop.restitution"}
+    pure = {"Body.orientation", "Driver.along", "Factor.polynomial", "Stop.restitution"}
     assert fields - {name for name in axes if ".ax" in name} == pure
 
 
