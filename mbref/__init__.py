@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from mbref.motions.drawing.picture import still
     from mbref.motions.drawing.plot import plot
     from mbref.motions.error_estimate import ErrorEstimate
+    from mbref.motions.inverse_dynamics import inverse_dynamics
     from mbref.motions.motion import Motion
     from mbref.motions.trajectory import Cost, Outcome, Trajectory
     from mbref.scene import Scene, SceneError
@@ -62,6 +63,7 @@ _PUBLIC = {  # module → its public names
     "motions.drawing.picture": ("still",),
     "motions.drawing.plot": ("plot",),
     "motions.error_estimate": ("ErrorEstimate",),
+    "motions.inverse_dynamics": ("inverse_dynamics",),
     "motions.motion": ("Motion",),
     "motions.trajectory": ("Cost", "Outcome", "Trajectory"),
     "scene": ("Scene", "SceneError"),
@@ -108,6 +110,7 @@ __all__ = [
     "find_scene",
     "fit",
     "idle_freedoms",
+    "inverse_dynamics",
     "motion_of_mode",
     "plot",
     "sensitivities",

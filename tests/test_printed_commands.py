@@ -71,6 +71,7 @@ def test_printed_commands_of_mbref_end_with_status_0(page, tmp_path):
         SCENES[OWN[page]]().save(tmp_path / "my.toml")
     elif page != "README.md":
         run(["mbref", "new", "my.toml"], tmp_path)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
     for words in commands(ROOT / page, ("sh",)):
         if words[0] == "mbref":
             run(words, tmp_path)

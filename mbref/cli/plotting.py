@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from mbref.cli.motors import add_motors, motion_by
 from mbref.cli.output import exit_status
 from mbref.cli.pictures import path_of
 from mbref.cli.request import Request, add_method_options, add_scene, add_units, request_of
@@ -59,6 +60,7 @@ def add(commands: Any) -> None:
         help="one curve for each value of an option of the method, such as alpha=1,5,25, or\n"
         "baumgarte.alpha=1,5 if two parts have it; may be repeated: all combinations",
     )
+    add_motors(parser)
     add_units(parser)
     add_output(parser, "--out", metavar="FILE", help=".svg or .png (default: as the scene, with -plot.svg)")
     add_method_options(parser, json=False)
@@ -85,8 +87,9 @@ def _motions(options: argparse.Namespace, run: Request, names: Sequence[str]) ->
         from mbref.simulation.sweep import methods_of
 
         methods = dict(methods_of(run.method, _values(options.vary)))
-    check = (lambda first: first.columns(*names)) if names else None
-    return {label: run._replace(method=each).motion(check) for label, each in methods.items()}
+    return {
+        label: motion_by(run._replace(method=each), options.motors, names) for label, each in methods.items()
+    }
 
 
 def _plot(options: argparse.Namespace) -> int:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbref.cli.motors import add_motors, motion_by
 from mbref.cli.output import body_table, column_tables, console, progress_bar, rounded
 from mbref.cli.request import add_method_options, add_scene, add_units, request_of
 from mbref.command_line import add_output
@@ -43,7 +44,8 @@ def add(commands: Any) -> None:
         "  mbref run mechanism.toml --method 'lm1+baumgarte[alpha=10,beta=10]/rk4[step=1e-4]'\n"
         "  mbref run four_bar --duration 0.1 --branch 2=2\n"
         "  mbref run mechanism.toml --out run.csv --units mm,deg --decimal-comma\n"
-        '  mbref run spatial_slider_crank --samples 5 --columns slider.position "driver(A).torque"',
+        '  mbref run spatial_slider_crank --samples 5 --columns slider.position "driver(A).torque"\n'
+        "  mbref run arm.toml --motors A E --out torques.csv",
     )
     add_scene(run)
     add_method_options(run)
@@ -62,6 +64,7 @@ def add(commands: Any) -> None:
         "mbref list outputs prints their names",
     )
     add_units(run)
+    add_motors(run)
     run.add_argument(
         "--decimal-comma",
         action="store_true",
@@ -92,13 +95,12 @@ def add(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     if options.decimal_comma and not str(options.out).endswith(".csv"):
         raise InputError("--decimal-comma: needs --out FILE.csv, whose numbers it writes")
+    if options.motors and (options.json or str(options.out).endswith(".json")):
+        raise InputError("--motors: JSON has no numbers of motors; use --columns, or --out FILE.csv")
     write, run = _writer(options.out), request_of(options, _branches(options.branch))
-    check = (
-        (lambda first: _estimated(first, options.estimate).columns(*options.columns))
-        if options.columns
-        else None
+    motion = motion_by(
+        run, options.motors, options.columns, lambda motion: _estimated(motion, options.estimate)
     )
-    motion = _estimated(run.motion(check), options.estimate)
     if options.out:
         write(motion, options)
     if options.json:
@@ -169,7 +171,7 @@ def show(
         out.print(f"event at t = {event.time:.6g} s: {event.sentence}")
     if not trajectory.times.size:
         return
-    out.print("\n".join(_largest(trajectory, units)))
+    out.print("\n".join((*_largest(trajectory, units), *_motors(trajectory, units))))
     if with_maxima:
         out.print(_maxima_table(trajectory, units))
     if columns:
@@ -214,6 +216,24 @@ def _undetermined(motion: Motion, columns: Sequence[str]) -> Iterator[str]:
                 f"{name}: equilibrium does not determine its force or torque at {int(marks.sum())} of "
                 f"{len(marks)} samples; another driver or constraint can take its place"
             )
+
+
+def _motors(motion: Motion, units: Sequence[str]) -> Iterator[str]:
+    """Yield the largest force or torque of each motor, redundant motors, and undecided samples."""
+    for name, motor in motion.motors.items():
+        kind, size = "force" if motor.torque is None else "torque", motor.amount
+        (unit, one), known = unit_of_column(kind, units), ~np.isnan(size)
+        if known.any():
+            k = int(np.nanargmax(np.abs(size)))
+            at = f"at t = {motion.times[k]:.6g} s"
+            yield f"motor({name}): largest {kind} {size[k] / one:.5g} {unit} {at}"
+        if not known.all():
+            yield (
+                f"motor({name}): UNDECIDED near a singular position, at {int((~known).sum())} of "
+                f"{known.size} samples"
+            )
+    if shared := [name for name, motor in motion.motors.items() if motor.open.any()]:
+        yield f"motors {', '.join(shared)} can replace each other; their torques have the least norm"
 
 
 def _largest(motion: Motion, units: Sequence[str]) -> Iterator[str]:

@@ -86,6 +86,12 @@ def _counted(model: Model, motion: Trajectory) -> np.ndarray | None:
     return np.array([joint_motion(model.scene, motion, name).angle for name in turning]).T
 
 
+def angles_from_start(model: Model, scene: Scene, motion: Trajectory) -> np.ndarray | None:
+    """Return the angles (k, a) of turning joints that ``Model.terms`` needs for polynomial couplings; None
+    without such couplings."""
+    return _counted(model, _from_start(scene, motion))
+
+
 def _from_start(scene: Scene, motion: Trajectory) -> Trajectory:
     """Return the motion with angles that count from its start, as couplings without offsets do."""
     start = angles_at_start(scene)
@@ -105,7 +111,7 @@ def determined_reactions(scene: Scene, motion: Trajectory) -> dict[str, np.ndarr
     model = Model(without_armatures(assembled(scene)))
     q, _, _ = coordinates(model, motion)
     q = q.reshape(len(q), model.nb, 7)
-    angles = _counted(model, _from_start(scene, motion))
+    angles = angles_from_start(model, scene, motion)
     found = determined_components(model, q, model.terms(motion.times, q, angles=angles).blocks, angles)
     model.release()
     return found
@@ -126,15 +132,15 @@ def coordinates(model: Model, motion: Trajectory) -> tuple[np.ndarray, np.ndarra
     """
     q = poses(model, motion.position, motion.orientation)
     p = q.reshape(-1, model.nb, 7)[:, : len(motion.bodies), 3:]
-    v = _in_frames(model, p, motion.velocity, motion.angular_velocity)
+    v = in_frames(model, p, motion.velocity, motion.angular_velocity)
     if motion.acceleration is None or motion.angular_acceleration is None:
         return q, v, None
-    return q, v, _in_frames(model, p, motion.acceleration, motion.angular_acceleration)
+    return q, v, in_frames(model, p, motion.acceleration, motion.angular_acceleration)
 
 
-def _in_frames(model: Model, p: np.ndarray, linear: np.ndarray, angular: np.ndarray) -> np.ndarray:
-    """Return world velocities (k, b, 3) and angular velocities as rates (k, 6 nb) in the frames p (k, b,
-    4)."""
+def in_frames(model: Model, p: np.ndarray, linear: np.ndarray, angular: np.ndarray) -> np.ndarray:
+    """Return world velocities (k, b, 3) and angular velocities as rates (k, 6 nb) in the frames p (k, b, 4);
+    of rows of rates, the rows for such rates."""
     found = np.zeros((len(p), model.nb, 6))
     found[:, : p.shape[1], :3] = linear
     found[:, : p.shape[1], 3:] = rotations.rotate(rotations.conjugate(p), angular)

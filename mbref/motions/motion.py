@@ -20,6 +20,7 @@ from mbref.motions.error_estimate import ErrorEstimate
 from mbref.motions.files import dataframe, read_json, write_csv, write_json
 from mbref.motions.joint_motion import JointMotion, joint_motion
 from mbref.motions.maxima import ReactionMaxima, reaction_maxima
+from mbref.motions.motor_motion import MotorMotion
 from mbref.motions.output_units import in_units
 from mbref.motions.outputs import all_columns, chosen
 from mbref.motions.restart_with_events import restarted
@@ -29,9 +30,7 @@ from mbref.scene import Scene
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Motion(Trajectory):
-    """A trajectory with its scene: the motion of body ``motion["rod"]`` and of joint ``motion.joint("A")``.
-
-    All attributes of Trajectory are present.
+    """A trajectory, with all its attributes, and its scene: ``motion["rod"]``, ``motion.joint("A")``.
 
     Attributes
     ----------
@@ -39,10 +38,13 @@ class Motion(Trajectory):
         The scene that moves.
     error_estimate : ErrorEstimate or None
         Estimated global error at the samples, which ``mbref.with_error_estimate`` adds. None before.
+    motors : dict of str to MotorMotion
+        By joint, forces or torques of motors, which ``mbref.inverse_dynamics`` adds; files lack them.
     """
 
     mechanism: Scene = field(kw_only=True)
     error_estimate: ErrorEstimate | None = None
+    motors: dict[str, MotorMotion] = field(default_factory=dict)
 
     @staticmethod
     def of(scene: Scene, trajectory: Trajectory) -> Motion:
@@ -84,8 +86,7 @@ class Motion(Trajectory):
 
     @property
     def energy(self) -> np.ndarray:
-        """Kinetic plus potential energy, J, shape (k,), constant without drivers, dampers, forces and
-        moments."""
+        """Kinetic plus potential energy, J, shape (k,), constant without drivers, dampers and forces."""
         return self.kinetic_energy + self.potential_energy
 
     def scene_at(self, t: float) -> Scene:

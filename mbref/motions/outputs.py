@@ -15,15 +15,23 @@ from mbref.input_error import InputError
 from mbref.scene.bodies import DRIVER
 from mbref.scene.fields import meant
 
-Owner = Literal["body", "joint", "driver", "load", "mechanism"]
+Owner = Literal["body", "joint", "driver", "motor", "load", "mechanism"]
 PREFIXES: dict[Owner, str] = {  # prefix of a column, by its owner
     "body": "{}.",
     "joint": "{}.",
     "driver": f"{DRIVER}.",
+    "motor": "motor({}).",
     "load": "load({}).",
     "mechanism": "",
 }
-EXAMPLES: dict[Owner, str] = {"body": "rod", "joint": "A", "driver": "A", "load": "0", "mechanism": ""}
+EXAMPLES: dict[Owner, str] = {
+    "body": "rod",
+    "joint": "A",
+    "driver": "A",
+    "motor": "A",
+    "load": "0",
+    "mechanism": "",
+}
 MASSES = "the mass and inertia of every body"
 ACCELERATIONS = "accelerations, which the engine does not give"
 SECOND_RUN = "a second run: mbref run without --estimate no, or mbref.with_error_estimate before"
@@ -32,6 +40,7 @@ SLIDING = "a joint that slides along one axis"
 LOAD_ABOUT_AXIS = "a load about a joint's axis"
 LOAD_ALONG_AXIS = "a load along a joint's axis"
 SOMETIMES = "joints or couplings with intervals (`active`)"
+MOTORS = "motors: mbref run or plot with --motors, or mbref.inverse_dynamics"
 PULLING = f"a spring, or {LOAD_ALONG_AXIS}"
 
 
@@ -115,6 +124,12 @@ OUTPUTS = (
         "1 where equilibrium does not determine the force or torque, else 0",
         MASSES,
     ),
+    Output("motor", "force", "N", "", "force of a motor along the axis, in place of the drivers", MOTORS),
+    Output("motor", "torque", "N m", "", "torque of a motor about the axis, in place of the drivers", MOTORS),
+    Output(
+        "motor", "power", "W", "", "power into the mechanism: torque times rate, or force times rate", MOTORS
+    ),
+    Output("motor", "open", "", "", "1 where other motors can replace this one, else 0", MOTORS),
     Output("load", "length", "m", "", "length of a spring", "a spring"),
     Output("load", "length_rate", "m/s", "", "rate of the length of a spring", "a spring"),
     Output("load", "force", "N", "", "pull of a spring; force on the second body along an axis", PULLING),
@@ -159,6 +174,7 @@ def all_columns(motion: Any, names: Sequence[str] = ()) -> dict[str, np.ndarray]
         **{("body", name): partial(motion.__getitem__, name) for name in motion.bodies},
         **{("joint", joint.name): partial(motion.joint, joint.name) for joint in scene.joint},
         **{("driver", each.joint): partial(motion.driver, each.joint) for each in scene.driver},
+        **{("motor", name): partial(motion.motors.__getitem__, name) for name in motion.motors},
         **{("load", str(place)): partial(motion.load_at, place) for place in range(len(scene.load))},
     }
     for (owner, name), find in owners.items():
