@@ -123,8 +123,8 @@ def test_driver_s_callback_is_removed_after_a_run() -> None:
 
 
 def test_thin_disc_whose_rounded_inertia_violates_the_triangle_inequality_moves_exactly() -> None:
-    """A disc has I_z = I_x + I_y, which rounding exceeds; MuJoCo refuses such bodies. The error from the free
-    body's closed form is at most ten times the measured 1.7e-13 m or rad."""
+    """A disc has I_z = I_x + I_y; here rounding makes I_z larger, and MuJoCo refuses such a body. The error
+    from the free body's closed form is at most ten times the measured 1.7e-13 m or rad."""
     inertia = (0.1, 0.1, 0.2 * (1 + 1e-12))
     disc = Body(name="disc", mass=1, inertia=inertia, position=(0, 0, 0), angular_velocity=(0, 0.1, 5))
     scene = Scene(name="disc", body=(disc,))

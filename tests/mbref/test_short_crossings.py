@@ -75,8 +75,8 @@ def test_swing_through_three_flat_positions_takes_at_most_18_steps_and_meets_the
 
 @pytest.mark.parametrize("name", ("four_bar", "five_bar"))
 def test_driven_loop_takes_at_most_14_steps_and_samples_at_and_near_a_crossing_are_exact(name):
-    """In 12.5 rad it passes four singular positions, each by one high-accuracy step; 14 steps are taken,
-    rejected ones included. Samples are at the first position, 10 µs from it, and elsewhere; poses and
+    """The crank turns by 12.5 rad over four singular positions, each in one high-accuracy step; 14 steps are
+    taken, rejected ones included. Samples are at the first position, 10 µs from it, and elsewhere; poses and
     velocities meet the judge's closed form to rounding."""
     scene = find_scene(name)
     first = simulate(scene, "taylor", [scene.duration]).crossings[0].time
