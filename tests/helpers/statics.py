@@ -31,9 +31,10 @@ def pendulum(place: Any = (0.7, 0.0, 0.0), **fields: Any) -> Scene:
     return Scene(name="pendulum", **given | fields)
 
 
-def parallelogram(angle_sine: float, angle_cosine: float) -> Scene:
-    """Return a parallelogram of three links of 1 m on pivots 1 m apart, with its crank at an angle."""
-    x, y = angle_cosine, angle_sine
+def parallelogram(sine: float, cosine: float) -> Scene:
+    """Return a parallelogram of three links of 1 m on pivots 1 m apart, under gravity 3° from -y. Its crank
+    is at the angle from x that has this sine and cosine."""
+    x, y = cosine, sine
     bodies = [
         rod("crank", (x / 2, y / 2, 0.0)),
         rod("coupler", (x + 0.5, y, 0.0)),
@@ -49,7 +50,8 @@ def parallelogram(angle_sine: float, angle_cosine: float) -> Scene:
 
 
 def ball_linkage(ends: tuple[str, str] = ("spherical", "spherical")) -> Scene:
-    """A spatial four-bar: two cranks on hinges, and a coupler between two joints of given types."""
+    """Return a spatial four-bar without gravity: two cranks on hinges, of which one is tilted, and a coupler
+    between joints of two types."""
     bodies = [rod("crank", (0, 0.25, 0.0)), rod("coupler", (0.5, 0.5, 0.1)), rod("rocker", (1.0, 0.25, 0.1))]
     places = ((0.0, 0.5, 0.0), (1.0, 0.5, 0.2))
     joints = [

@@ -152,7 +152,7 @@ def test_angles_without_their_full_turns_are_explained_as_such() -> None:
 def torque_of_a(length: float, driven_joints: str) -> float:
     """Return the torque of the driver of A (N m) on a parallelogram with drivers at the named joints."""
     drivers = [Driver(joint=name, polynomial=(0.0, 1.0, 2.0)) for name in driven_joints]
-    scene = in_other_units(parallelogram(0.6, 0.8).with_(driver=drivers), length, 1.0)
+    scene = in_other_units(parallelogram(sine=0.6, cosine=0.8).with_(driver=drivers), length, 1.0)
     return float(crosscheck.reference_table(scene, [0.01])["driver(A).torque"][0])
 
 

@@ -26,8 +26,9 @@ def table(of_motor: float, of_slide: float) -> Scene:
 
 @pytest.mark.parametrize("armatures", [(0.0, 0.0), (0.7, 0.0), (0.0, 1.3), (0.7, 1.3)])
 def test_armature_changes_the_frequency_of_a_carriage_on_a_turntable_and_not_its_place(armatures):
-    """Closed forms: m ω² (r + x) = k x, and vibrations of √((k - m ω²) / (m + I)) rad/s, which the search
-    finds to 1e-9 and 1e-7. The equilibrium's scene has the armatures still."""
+    """The carriage rests at r + x with m ω² (r + x) = k x, which gives r k / (k - m ω²), and vibrates at
+    √((k - m ω²) / (m + I)) rad/s with the armature I of its guide. The search finds the place to 1e-9 and the
+    frequency to 1e-7. The equilibrium's scene still has the armatures."""
     (found,) = equilibria(table(*armatures), starts=2)
     place = START * STIFFNESS / (STIFFNESS - MASS * RATE**2)
     assert np.linalg.norm(found.scene.body[1].position) == pytest.approx(place, rel=1e-9)

@@ -1,6 +1,7 @@
 """Design: loops closed with given lengths, exchanges of joints, and diagnosis along a motion."""
 
 import math
+import tomllib
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ ROUNDING = 1e-12  # m or rad, of lengths of about 0.5 m after 20 partial displac
 
 
 def violation(scene: Scene) -> float:
-    """Return the largest violation of the joints at the start."""
+    """Return the largest violation of the joints at the start (m or rad)."""
     model = Model(scene.with_(driver=()))
     return float(np.abs(model.terms(0.0, model.start()).phi).max())
 
@@ -106,7 +107,8 @@ def test_sides_that_violate_the_triangle_inequality_are_refused():
 
 
 def test_hinge_with_a_driver_or_a_torsion_spring_is_exchanged_only_for_a_cylindrical_joint():
-    """Of the joints with fewer rows only the cylindrical one has the angle on which driver and spring act."""
+    """Joints with fewer rows than a hinge may replace it. Of these only the cylindrical joint has an angle,
+    on which a driver and a torsion spring act."""
     plain = find_scene("planar_slider_crank")
     spring = TorsionSpring(joint="A", stiffness=1.0, damping=0.0, natural_angle=0.1)
     kinds = {
@@ -123,7 +125,9 @@ BALL, LINE = "spherical", "inline"
 
 
 def test_one_of_two_hinges_is_removed_unless_something_acts_on_it():
-    """A pendulum on two hinges of one axis: 10 rows of rank 5, as a ball and a point on a line have."""
+    """A pendulum on two hinges of one axis has 10 rows of rank 5. A ball joint (3 rows) and a point on a line
+    (2 rows) hold it as well without redundancy, and so does one hinge. If a driver acts on the upper hinge,
+    only the lower one may go. The ground is a frame or a body."""
     hinges = [hinge(name, "ground", "door", (0.0, 0.0, z)) for name, z in (("lower", 0.0), ("upper", 1.0))]
     for ground in ("frame", "body"):
         twice = Scene(name="door", ground=ground, body=[rod("door", (0.5, 0.0, 0.0))], joint=hinges)
@@ -161,8 +165,8 @@ def test_no_exchange_ends_the_redundancy_of_a_second_coupler_of_equal_length():
 
 
 def test_diagnosis_along_a_motion_that_ends_early_states_cause_and_time():
-    """A four-bar whose hinge B is tilted by 0.003 cannot follow its driver: Newton's method does not
-    converge. Without tilt the motion ends as planned, and no cause is stated."""
+    """A four-bar whose hinge B is tilted by 0.003 rad closes at the start, but cannot follow its driver:
+    Newton's method does not converge. Without tilt the motion ends as planned, and no cause is stated."""
     scene = find_scene("four_bar").with_(duration=0.01)
     found = along_motion(tilted_at_rest(scene, 0.003))
     assert found.end < 0.01
@@ -171,7 +175,8 @@ def test_diagnosis_along_a_motion_that_ends_early_states_cause_and_time():
 
 
 def test_driver_of_a_locked_loop_is_refused_at_the_start():
-    """A hinge tilted by 0.1 leaves the loop no degree of freedom."""
+    """A hinge tilted by 0.1 rad leaves the loop no degree of freedom, so that the driver's rate at t = 0
+    contradicts the joints."""
     with pytest.raises(
         SceneError, match=r"driver\[A\]: contradicts the joints at t = 0, most of all at joint"
     ):
@@ -187,8 +192,9 @@ def tilted_at_rest(scene, tilt):
 
 
 def test_redundancy_that_a_rounded_axis_hides_is_reported():
-    """Axis B is off by 2e-7 rad: the row that would be redundant has a singular value below this tilt and
-    far above 1e-16. It is reported, and still counts as redundant, as without the tilt."""
+    """Axis B is off by 2e-7 rad, and the row that is redundant without this tilt has a singular value below
+    the tilt and far above the rounding of 1e-16. ``by_rounding`` has the value, and the row still counts as
+    redundant."""
     scene = find_scene("planar_slider_crank_gravity").with_(duration=0.2)
     tilted = scene.with_("joint[B].axis", [2e-7, 0.0, 1.0])
     assert along_motion(scene).by_rounding == ()
@@ -197,15 +203,23 @@ def test_redundancy_that_a_rounded_axis_hides_is_reported():
     assert found.by_rounding and 1e-9 < max(found.by_rounding) < 2e-7
 
 
+def without_comment_sign(line: str) -> str:
+    """Return the line without the sign if the rest is TOML, the head of a table or a field."""
+    try:
+        tomllib.loads(line.removeprefix("# "))
+    except tomllib.TOMLDecodeError:
+        return line
+    return line.removeprefix("# ")
+
+
 def test_template_is_a_scene_also_with_its_commented_entries(tmp_path):
-    """The template of a slider-crank has one degree of freedom. Its commented lines that begin with a table
-    or the name of a field become a valid scene with a load of each kind when the comment sign is removed."""
+    """The template is a slider-crank with one degree of freedom and a moment as its load. Its comments that
+    are TOML, and no prose, are three further loads, a driver, and fields of the crank such as its angular
+    velocity of 5 rad/s: the scene is valid with them, too."""
     (tmp_path / "plain.toml").write_text(template())
     plain = Scene.from_file(tmp_path / "plain.toml")
     assert counts(plain).degrees_of_freedom == 1
-    words = "[[ type body bodies point force stiffness damping natural joint polynomial sine orientation"
-    entries = tuple(f"# {word}" for word in f"{words} velocity angular".split())
-    lines = [line[2:] if line.startswith(entries) else line for line in template().splitlines()]
+    lines = [without_comment_sign(line) for line in template().splitlines()]
     (tmp_path / "whole.toml").write_text("\n".join(lines))
     whole = Scene.from_file(tmp_path / "whole.toml")
     assert {load.type for load in whole.load} == {"moment", "force", "spring", "torsion_spring"}

@@ -39,22 +39,21 @@ def test_rows_redundancy_and_freedoms_equal_the_judges_in_every_unit_of_length(s
 
 @pytest.mark.parametrize("name", ["planar_slider_crank", "bennett", "sarrus", "four_bar_chain"])
 def test_smallest_singular_value_of_built_in_scenes_does_not_depend_on_size(name):
-    """It is a number without unit, of rows relative to the mechanism's length. Rounding over the value is
-    below 1e-8."""
+    """The value has no unit, as rows are relative to the mechanism's length. Rounding is below 1e-8 of it."""
     scene = find_scene(name)
-    values = diagnose(scene).smallest_singular_value
+    value = diagnose(scene).smallest_singular_value
     for size in SIZES:
         scaled = diagnose(in_other_units(scene, size, 1.0))
-        assert scaled.smallest_singular_value == pytest.approx(values, rel=1e-8)
+        assert scaled.smallest_singular_value == pytest.approx(value, rel=1e-8)
 
 
 @pytest.mark.parametrize("size", [1e-6, 0.01, 1e6])
 def test_diagnose_prints_at_every_size_that_a_linkage_stays_away_from_singularity(size, tmp_path, capsys):
-    """A parallelogram whose crank stands at 53 degrees and hardly moves in 0.05 s; its links are of 1 m times
-    the size."""
+    """A parallelogram of links of 1 m times the size rests without gravity, its crank at 53 degrees: far from
+    its flat, singular positions. Lines with "singular" are the same at every size."""
     shown = []
     for factor in (1.0, size):
-        scene = in_other_units(parallelogram(0.8, 0.6), factor, 1.0).with_(duration=0.05)
+        scene = in_other_units(parallelogram(sine=0.8, cosine=0.6), factor, 1.0).with_(duration=0.05)
         path = str(tmp_path / f"{factor}.toml")
         scene.with_(gravity=(0.0, 0.0, 0.0)).save(path)
         assert main(["diagnose", path]) == 0
@@ -70,8 +69,10 @@ def printed(scene: Scene, folder: Path, capsys: pytest.CaptureFixture[str]) -> s
 
 
 def test_diagnosis_lists_the_three_crossings_of_a_swinging_rhombus():
-    """Its links hang: released at θ = 0.3 rad they swing through 0 and -π, turn at -π - 0.3 rad and pass -π
-    again within 1 s. The crank of the closed form is level, y = 0, at these times."""
+    """A rhombus is flat, and so singular, where its crank is level. Released at 0.3 rad, the crank swings
+    down through 0 to -π, turns back at -π - 0.3 rad and is at -π again within 1 s. The closed form has its
+    height y at the samples, which changes sign three times, and at the times of the crossings, where it is
+    zero."""
     scene = four_bar_gravity(0.3)
     crossings, exact = mbref.along_motion(scene).crossings, closed_form(scene)
     assert [each.sentence for each in crossings] == ["2 branches"] * 3
@@ -82,10 +83,12 @@ def test_diagnosis_lists_the_three_crossings_of_a_swinging_rhombus():
 
 
 def test_each_exchange_of_a_hinge_ends_the_redundancy_and_keeps_the_freedom_by_the_judge():
-    """A four-bar of four parallel hinges has three redundant rows."""
-    scene = parallelogram(0.7, 1.0)
+    """The judge's `mobility` counts rows, redundant rows and freedoms. Four parallel hinges have 20 rows for
+    18 coordinates of three links and leave one freedom: 20 - (18 - 1) = 3 rows are redundant. An exchange
+    ends the redundancy if none is left, and the freedom is still one."""
+    scene = parallelogram(sine=0.8, cosine=0.6)
     found = exchanges(scene)
-    assert mobility(scene)[1:] == (3, 1) and {"A": "inline"} in found
+    assert tuple(mobility(scene)) == (20, 3, 1) and {"A": "inline"} in found
     for exchange in found:
         joints = [
             {**hinge.model_dump(exclude={"armature", "stop"}), "type": exchange.get(hinge.name, hinge.type)}
@@ -119,7 +122,9 @@ def test_welded_halves_of_a_rod_between_two_ball_joints_are_named_together(tmp_p
     [("translational", "can slide between its joints"), ("cylindrical", "can move alone in 2 ways")],
 )
 def test_sleeve_between_two_parallel_guides_is_named_with_its_ways_to_move(kind, says, tmp_path, capsys):
-    """The guides are on the ground and on a lever that cannot turn: a motion of the sleeve moves no lever."""
+    """The sleeve is on a guide of the ground, and the lever on a guide of the sleeve, along the same line.
+    The lever's hinge is perpendicular to it, so that the guides hold the lever: the sleeve moves alone, by
+    sliding, and by turning where the guides are cylindrical."""
     guide = {"type": kind, "axis": [1.0, 0.0, 0.0]}
     joints = [
         {"name": "G", "bodies": ["ground", "sleeve"], "anchor": [0.0, 0.0, 0.0], **guide},
@@ -140,7 +145,7 @@ CHAIN = Scene(
 
 @pytest.mark.parametrize(
     "scene",
-    [ball_linkage(("universal", "spherical")), parallelogram(0.8, 0.6), CHAIN],
+    [ball_linkage(("universal", "spherical")), parallelogram(sine=0.8, cosine=0.6), CHAIN],
     ids=["rod held by a universal joint", "parallelogram", "last link of a chain"],
 )
 def test_no_idle_freedom_is_named_where_no_rod_spins(scene, tmp_path, capsys):

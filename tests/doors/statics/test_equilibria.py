@@ -35,7 +35,7 @@ def with_slide(stiffness: float, damping: float, mass: float) -> Scene:
 def test_flat_parallelogram_is_an_equilibrium_at_a_singular_position_and_has_no_modes(tmp_path, capsys):
     """Gravity acts along the line of all links, so that they rest. `equilibrium` reports it; `modes`, which
     needs equations of motion there, refuses it."""
-    flat = parallelogram(0.0, 1.0).with_(gravity=(G, 0.0, 0.0))
+    flat = parallelogram(sine=0.0, cosine=1.0).with_(gravity=(G, 0.0, 0.0))
     found = equilibria(flat, starts=2)
     assert found[0].stability == "singular" and len(found[0].eigenvalues) == 0
     path = str(tmp_path / "flat.toml")
@@ -78,7 +78,7 @@ def test_inverted_pendulum_is_stable_or_unstable_by_a_millionth_of_its_critical_
 
 
 def test_slow_fall_of_a_pendulum_is_found_beside_a_damper_ten_million_times_faster():
-    """The pendulum falls with √(m g l / I) = 3.4 1/s, and the block of 0.1 g has c / m = 1e7 1/s."""
+    """The pendulum falls with √(m g l / I) = 3.3 1/s, and the block of 0.1 g has c / m = 1e7 1/s."""
     fast = with_slide(100.0, 1000.0, 1e-4)
     rate = np.sqrt(TORQUE / ABOUT_HINGE)
     [upright] = equilibria(fast, starts=1)
@@ -142,9 +142,9 @@ def rods(lengths: np.ndarray, masses: np.ndarray, angles: np.ndarray, load: list
 
 @pytest.mark.parametrize("is_on_slide", [False, True])
 def test_chain_that_a_stiff_spring_holds_is_found_in_both_stable_poses(is_on_slide):
-    """Three rods hang from the origin, or from a block there on a slide with a spring of 1e8 N/m; a spring
-    holds the middle of the second one. The potential energy is least near the given pose, and near the pose
-    to 10 mm to which scipy comes from the hanging one."""
+    """Three rods hang from the origin, or from a block there on a slide with a spring of 1e8 N/m; another
+    spring holds the middle of the second rod. The potential energy has two least values: scipy finds one from
+    the pose at the start, the other from the hanging pose. Both are stable poses, to 10 mm."""
     stiffness = 1e7
     lengths, masses, start = np.array([1.0, 1.0, 0.5]), np.array([2.0, 2.0, 1.0]), np.array([0.5, 1.0, 1.5])
     held, fixed = centres(lengths, start)[1], np.array([0.5, -1.2, 0.0])
@@ -171,8 +171,8 @@ def test_chain_that_a_stiff_spring_holds_is_found_in_both_stable_poses(is_on_sli
 
 def test_chain_with_elbows_of_different_stiffness_is_found_after_they_have_straightened():
     """Springs of 3e6 and 6e7 N m/rad begin 0.15 and 0.47 rad from their natural angles; a spring of 2e4 N/m
-    holds the end. At rest the elbows are rigid to 1e-5 rad, so that two angles remain: scipy's least energy
-    is a stable pose to 0.1 mm."""
+    holds the end. At rest both elbows are at their natural angles to 1e-5 rad. The energy of the chain with
+    rigid elbows has two variables, and scipy's least value of it is a stable pose, to 0.1 mm."""
     lengths, masses = np.array([0.8, 0.6, 0.5, 0.7]), np.array([2.0, 1.0, 0.5, 1.5])
     start = np.array([2.1, 3.1, 1.8, 3.0])
     fixed, stiffness, length, natural = np.array([1.3, -1.0, 0.0]), 2e4, 1.3, (0.15, 0.47)
@@ -199,7 +199,8 @@ def test_chain_with_elbows_of_different_stiffness_is_found_after_they_have_strai
 
 
 def test_rod_on_a_stiff_slide_along_a_pendulum_is_found_hanging():
-    """The search begins at 1 rad and 0.5 rad. At rest the rod extends the spring by m g / k = 1.5 G / k."""
+    """The search begins with the pendulum at 1 rad and the rod at 0.5 rad. At rest both hang; block and rod,
+    of 0.5 kg and 1 kg, extend the slide's spring by m g / k."""
     stiffness = 1e9
     along, aside = (np.array([np.sin(a), -np.cos(a), 0.0]) for a in (1.0, 0.5))
     at = 0.8 * along
@@ -273,9 +274,9 @@ def test_springs_wound_by_many_turns_unwind_to_the_equilibrium_near_their_natura
     ],
 )
 def test_all_windings_of_a_soft_spring_have_their_equilibria(share, natural, starts, count):
-    """Each balances k (φ₀ - φ) = m g l cos φ, with k = share · m g l and φ₀ = natural. A table of 20001
-    angles shows the changes of sign: their number is ``count``, and the table's step the error of the twists
-    φ₀ - φ."""
+    """At each, k (φ₀ - φ) = m g l cos φ, with k = share · m g l and φ₀ = natural. The difference of both
+    sides changes its sign ``count`` times in a table of 20001 angles, which gives the twists φ₀ - φ to its
+    step."""
     stiffness = share * TORQUE
     angles = natural + np.linspace(-1.01, 1.01, 20001) / share
     off = stiffness * (natural - angles) - TORQUE * np.cos(angles)
@@ -298,9 +299,9 @@ def test_angle_of_a_wheel_that_no_force_turns_makes_one_indifferent_equilibrium(
 
 @pytest.mark.parametrize("gravity", [DOWN, (3.0, -5.0, -7.0)])
 def test_linkage_whose_coupler_spins_idly_has_the_equilibria_of_one_whose_universal_joint_holds_it(gravity):
-    """No force turns the coupler about its axis: its centre rests at the same places (m). Poses that are
-    stable with the universal joint become indifferent, as two eigenvalues (1/s) are zero within their
-    bounds."""
+    """No force turns the free coupler about its axis, so that its centre rests at the places of the held one.
+    Its spin adds two eigenvalues, which are zero within their bounds: poses that are stable with the
+    universal joint become indifferent."""
     free, held = (
         equilibria(ball_linkage((end, "spherical")).with_(gravity=gravity), 4)
         for end in ("spherical", "universal")
@@ -314,7 +315,8 @@ def test_linkage_whose_coupler_spins_idly_has_the_equilibria_of_one_whose_univer
 
 
 def test_rod_on_a_ball_joint_hangs_and_stands_and_spins_idly():
-    """A thin rod of length l has the rate √(3 g / 2 l), twice with both signs, and zero twice by its spin."""
+    """A thin rod of length l has the rates ± √(3 g / 2 l), imaginary where it hangs, in each of two planes,
+    and zero twice by its spin about itself."""
     end = (0.9, -0.2, 0.1)
     joints = [parts.joint("B", "spherical", "ground", "rod")]
     scene = Scene(name="rod", gravity=DOWN, body=[parts.rod("rod", ORIGIN, end)], joint=joints)

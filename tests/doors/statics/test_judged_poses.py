@@ -30,24 +30,25 @@ def test_weights_in_balance_at_every_height_are_printed_as_one_indifferent_equil
 
 @pytest.mark.slow
 def test_pendulum_that_its_spring_just_holds_is_one_indifferent_equilibrium():
-    """Critical stiffness m g l with 2 kg at 0.7 m."""
+    """The critical stiffness of the inverted pendulum is m g l, with 2 kg at 0.7 m."""
     spring = {"type": "torsion_spring", "joint": "A", "stiffness": 2.0 * G * 0.7}
     [each] = steady_poses(pendulum((0.0, 0.7, 0.0), load=[spring]))
     assert each.stability == "indifferent"
 
 
 def test_flat_parallelogram_at_a_singular_position_is_left_out_and_a_hanging_one_is_found():
-    """All links of the flat one lie along gravity, so that no moment moves its pose; but a singular position
-    has no small motions to judge. The other's cranks hang 13° from their equilibrium below the pivots."""
-    flat = parallelogram(angle_sine=0.0, angle_cosine=1.0).with_(gravity=(G, 0.0, 0.0))
+    """All links of the flat one lie along gravity, so that it rests; but a singular position has no small
+    motions to judge. The other's cranks start 13° from their equilibrium below the pivots."""
+    flat = parallelogram(sine=0.0, cosine=1.0).with_(gravity=(G, 0.0, 0.0))
     assert not steady_poses(flat, starts=1)
-    hanging = parallelogram(angle_sine=-0.96, angle_cosine=0.28)
+    hanging = parallelogram(sine=-0.96, cosine=0.28)
     assert [each.stability for each in steady_poses(hanging, starts=1)] == ["stable"]
 
 
 def test_slow_fall_of_a_pendulum_is_found_beside_a_damper_millions_of_times_faster():
-    """√(m g l / (J + m l²)) = 3.4 1/s is found within the judge's bound of the eigenvalue, which is below
-    1e-9 1/s, beside c / m = 8e6 1/s. 4e-16 is the rounding of the closed form."""
+    """The pendulum falls with √(m g l / (J + m l²)) = 3.3 1/s, and a block of 0.1 g is damped with
+    c / m = 8e6 1/s. The error of the slow eigenvalue is at most the judge's bound, which is below 1e-9 1/s,
+    and the rounding of the closed form, 4e-16 of it."""
     beside = pendulum((0.0, 0.7, 0.0))
     damper = {"type": "slide_spring", "joint": "T", "stiffness": 50.0, "damping": 800.0}
     scene = beside.with_(

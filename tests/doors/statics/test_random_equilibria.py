@@ -56,7 +56,8 @@ def judged(scene: Scene, starts: int) -> list[Judged]:
 
 @pytest.mark.parametrize("seed", [0, 3])
 def test_eigenvalues_agree_with_the_judges_within_their_bounds(seed):
-    """Eigenvalues of the judge's own linearised equations; at the equilibrium accelerations vanish."""
+    """The judge's eigenvalues are those of its own linearised equations at the pose that is found, where its
+    own accelerations vanish."""
     (found,) = judged(at_rest(random_mechanism(seed)), starts=1)
     assert found.acceleration < BALANCED and found.eigenvalues <= 1
 
@@ -85,15 +86,16 @@ SPRING = {"type": "torsion_spring", "joint": "A", "stiffness": 30.0, "damping": 
 
 @pytest.mark.parametrize(("length", "mass", "time"), [(1e-6, 1.0, 1.0), (1e3, 1e-9, 1e-3), (1e6, 1e9, 1e3)])
 @pytest.mark.parametrize(
-    "scene", [parallelogram(0.6, 0.8), pendulum(load=[SPRING])], ids=["linkage", "sprung"]
+    "scene", [parallelogram(sine=0.6, cosine=0.8), pendulum(load=[SPRING])], ids=["linkage", "sprung"]
 )
 def test_equilibria_in_other_units_have_proportional_places_and_eigenvalues(scene, length, mass, time):
-    """Eigenvalues (1/s) times the unit of time agree within the bounds of both, places to 1e-9 m."""
+    """``length``, ``mass`` and ``time`` are factors of the numbers. Eigenvalues (1/s) times the factor of
+    time agree within the bounds of both, places divided by the factor of length to 1e-9 m."""
     found, others = equilibria(scene, 3), equilibria(in_other_units(scaled(scene, mass), length, time), 3)
     assert found
     for each, other in zip(found, others, strict=True):
         assert each.stability == other.stability
         allowed = (each.bounds + time * other.bounds) + ROUNDED * np.abs(each.eigenvalues).max()
         assert (np.abs(each.eigenvalues - time * other.eigenvalues) <= allowed).all()
-        places = [np.array([body.position for body in found.scene.body]) for found in (each, other)]
+        places = [np.array([body.position for body in one.scene.body]) for one in (each, other)]
         assert np.allclose(places[0], places[1] / length, rtol=0.0, atol=1e-9)
