@@ -146,7 +146,7 @@ def test_quick_depth_runs_the_files_own_settings_as_the_only_family_of_the_file(
 
 
 def test_printed_command_of_a_run_names_the_file_with_its_import_options(tmp_path):
-    """The path is the command's argument, so it is no option ``file=`` of the setting."""
+    """The path is the command's argument. The setting's option ``file``, which repeats it, is not printed."""
     scene = imported(tmp_path, FOUR_BAR, TILTED)
     times = np.linspace(0, scene.duration, 3)
     record = run_here(Case(scene, times, "mujoco", setting_of(scene, AS_IN_FILE), 5.0, 0.0))
@@ -158,8 +158,9 @@ def test_printed_command_of_a_run_names_the_file_with_its_import_options(tmp_pat
 
 
 def sentence(scene, tilt: float = 0.0, **changes) -> str:
-    """Return the verdict on a run of the file: off by 20 mm and 0.03 rad, closures open by 1.2 mm, the last
-    body tilted by an angle, rad, about the world's x axis."""
+    """Return the verdict on a made-up run of the file, off by 20 mm and 0.03 rad. Its last body, and so the
+    closure, is 1.2 mm aside, and is tilted by an angle (rad) about the world's x axis. ``changes`` are other
+    fields of its record."""
     settings = {"step": 0.004, "integrator": "Euler", "solref": "0.03 1", "file": "/my robots/robot.xml"}
     metrics = {"error": 0.2, "position_error": 0.02 / scene_length(scene), "rotation_error": 0.03}
     places, turns = initial_poses(scene)
@@ -175,7 +176,8 @@ def sentence(scene, tilt: float = 0.0, **changes) -> str:
 
 
 def test_verdict_on_a_files_own_settings_states_errors_and_the_opening_of_closures(tmp_path):
-    """The run of `sentence` is off by 20 mm and 0.03 rad, and its closure is open by 1.2 mm."""
+    """The run of `sentence` is off by 20 mm and 0.03 rad, and its closure is open by 1.2 mm: a tenth of it,
+    rounded, is 0.1 mm."""
     assert sentence(imported(tmp_path, FOUR_BAR, TILTED)) == (
         "robot at its own settings (time step 0.004 s, Euler, solref 0.03 1) is wrong: bodies are off by "
         "up to 20 mm and 0.03 rad, and its closures open by up to 1.2 mm. `crosscheck tune mujoco "
@@ -184,9 +186,9 @@ def test_verdict_on_a_files_own_settings_states_errors_and_the_opening_of_closur
     )
 
 
-def test_verdict_on_a_files_own_settings_states_an_angle_in_rad_and_no_lever(tmp_path):
-    """The last body is tilted by 0.004 rad about its own centre, across the axis of its hinge. Its joints,
-    less than 0.2 m from there, open by less than 2 mm."""
+def test_verdict_on_a_files_own_settings_states_the_tilt_of_an_axis_in_rad_beside_the_gap(tmp_path):
+    """The last body is moved by 1.2 mm, and tilted by 0.004 rad about its centre, across the axis of its
+    hinge. Its joints, less than 0.2 m from there, open by less than 1.2 mm + 0.004 · 200 mm = 2 mm."""
     said = sentence(imported(tmp_path, FOUR_BAR, TILTED), tilt=0.004)
     gap, angle = re.search(r"its closures open by up to (\S+) mm and (\S+) rad", said).groups()
     assert 1.2 <= float(gap) < 2.0 and angle == "0.004", said
@@ -202,7 +204,8 @@ def test_verdict_on_a_files_own_settings_states_an_angle_in_rad_and_no_lever(tmp
     ids=["right", "failed", "no truth"],
 )
 def test_verdict_on_right_failed_and_unjudged_runs_proposes_no_tuning(tmp_path, changes, says):
-    """Right is an error of 1e-9; a run without a known error is judged by its closures alone."""
+    """Changed fields of the record: an error of 1e-9, which is right; an early end; no known error, so that
+    the verdict states the closures alone."""
     said = sentence(imported(tmp_path, FOUR_BAR, TILTED), **changes)
     assert says in said and "tune" not in said, said
 
@@ -243,8 +246,8 @@ def test_hold_refuses_a_body_that_hangs_on_another_body(tmp_path):
 
 
 def test_a_body_falls_freely_only_without_joints_and_spin_and_with_gravity():
-    """Its motion is g t² / 2 then. A joint to the ground holds it, a spin adds Euler's equations, and without
-    gravity nothing falls."""
+    """Only then its motion is g t² / 2. A joint to the ground holds it, a spin adds Euler's equations, and
+    without gravity nothing falls."""
     top = SCENES["heavy_top"]()
     still = top.with_(joint=()).with_("body[0].angular_velocity", (0.0, 0.0, 0.0))
     assert falls_freely(still) and not falls_freely(still.with_(joint=top.joint))

@@ -27,8 +27,8 @@ SIZED = {"pushed, 1 mm": pushed(0.4, 0.3, 0.5, 0.7, 1e-3), "pushed, 1 km": pushe
 
 @pytest.mark.parametrize(("scene", "time"), [*MADE.values(), *SIZED.values()], ids=[*MADE, *SIZED])
 def test_reference_ends_at_the_dead_position_of_a_driven_slider_crank(scene, time):
-    """Closed forms: a pushed slider cannot go farther than crank + rod from the shaft; a crank that is longer
-    than its rod cannot turn on when the rod stands upright."""
+    """Closed forms (``pushed`` and ``turned``): a pushed slider is at its greatest distance from the shaft,
+    crank + rod; a driven crank that is longer than its rod cannot turn on once the rod stands upright."""
     assert end_of(scene) == pytest.approx(time, rel=ACCURACY)
 
 
@@ -49,7 +49,8 @@ def test_singular_positions_of_a_driven_four_bar_are_no_dead_positions():
 @pytest.mark.slow  # each a reference of 2 CPU s; references end at dead positions in the tests below
 @pytest.mark.parametrize("name", ["turned", "pushed"])
 def test_comparison_with_even_samples_is_shortened_to_end_just_before_the_dead_position(name):
-    """It keeps its 41 even samples, over at least 0.95 of the closed form's time."""
+    """It keeps the number of 41 even samples. "Just before" means here within the last 5 % of the closed
+    form's time."""
     scene, time = MADE[name]
     shorter = followed(scene, np.linspace(0.0, scene.duration, 41), SECONDS)
     assert shorter.dead == pytest.approx(time, rel=ACCURACY)
@@ -69,7 +70,8 @@ def test_comparison_with_uneven_samples_keeps_the_samples_before_the_dead_positi
 
 @pytest.mark.slow  # runs of an engine and a reference: 5 CPU s
 def test_engine_is_judged_up_to_the_dead_position_and_the_verdict_states_its_time():
-    """OndselSolver is right up to there. The closed form gives the time."""
+    """OndselSolver is right up to there. The closed form gives the time; the headline states it with four
+    digits."""
     scene, time = MADE["pushed"]
     found = crosscheck.compare(scene, "ondsel", reference_time=SECONDS)
     assert found.difference is None and found.judged.differences == {}

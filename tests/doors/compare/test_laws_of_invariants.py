@@ -9,10 +9,11 @@ from crosscheck.conformance.runners import InProcess
 from crosscheck.invariants.laws import COLUMNS, cell
 from tests.helpers.low_order_engines import euler, low_order, symplectic_euler
 
-STEPS = COLUMNS[-1]
+STEPS = COLUMNS[-1]  # the column of errors at the finest step
 
 
 def run(x: float, value: float | None, outcome: str = "COMPLETED") -> dict:
+    """Return the record of a run with the step x (s) and its error."""
     values = {STEPS.value: value}
     return {"experiment": STEPS.experiment, "x": x, "values": values, "outcome": outcome, "message": ""}
 
@@ -25,7 +26,7 @@ def test_power_of_a_law_is_found_whatever_its_sign(power: float) -> None:
 
 
 def test_cell_names_rounding_failures_and_refusals() -> None:
-    """Two values have no law, and values below 1e-12 are rounding. Signs of the table: ! no run completes,
+    """Two values give no power, and values below 1e-12 are rounding. Signs of the table: ! no run completes,
     – refused, ○ no record."""
     assert cell([run(0.1, 3e-3), run(0.01, 2e-3)], STEPS) == "2e-03"
     assert cell([run(0.1, 1e-9), run(0.01, 1e-14), run(0.001, None, "TIMED_OUT")], STEPS) == "<1e-12"
@@ -35,8 +36,8 @@ def test_cell_names_rounding_failures_and_refusals() -> None:
 
 @pytest.mark.parametrize(("step", "status"), [(euler, suite.FAIL), (symplectic_euler, suite.PASS)])
 def test_explicit_euler_feeds_energy_into_a_tumbling_body_and_symplectic_euler_does_not(step, status):
-    """Both are of order 1, with energy errors of equal size and opposite sign; the suite's check passive
-    allows no gain. The engine has settings of 10 and 20 steps over the duration."""
+    """Both are of order 1, with energy errors of equal size and opposite sign; the check "passive" of the
+    suite allows no gain. Settings of 10 and 20 steps over the duration suffice to show it."""
     body = next(each.scene for each in specimens() if each.scene.name == "tumbling body")
     bench = trial.set_up(InProcess(low_order(step, parts=(10, 20))), Specimen(body, keeps="energy"))
     assert suite.verdict_on("passive", bench).status == status

@@ -14,8 +14,9 @@ from tests.helpers.geared_arms import arms
 TIMES = np.array([0.0, 1.0])
 
 
-def standing(scene: Scene, moved: np.ndarray, turned: np.ndarray) -> Trajectory:
-    """Return a run in which the last body turns by a rotation vector (rad) about its hinge and moves (m)."""
+def displaced(scene: Scene, moved: np.ndarray, turned: np.ndarray) -> Trajectory:
+    """Return a run of two samples, the start and a pose in which the last body is turned by a rotation vector
+    (rad) about the anchor of its hinge and then moved by a vector (m)."""
     position = np.array([[body.position for body in scene.body]] * 2)
     orientation = np.tile([1.0, 0.0, 0.0, 0.0], (2, len(scene.body), 1))
     turn = rotations.from_vector(turned)
@@ -30,23 +31,24 @@ def standing(scene: Scene, moved: np.ndarray, turned: np.ndarray) -> Trajectory:
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("seed", range(4))
 def test_opening_has_the_distance_of_the_joints_points_and_the_tilt_of_its_axis(size: float, seed: int):
-    """The arm is shifted by a random vector, and tilted about x while its hinge turns about z. Rounding of
-    the arms is below 1e-9 of both."""
+    """An arm whose hinge turns about z is tilted about x through the hinge's anchor, and shifted by a random
+    vector. Rounding of the arms is below 1e-9 of both."""
     random = np.random.default_rng(seed)
     moved, tilt = 0.01 * size * random.normal(size=3), random.uniform(0.1, 1.0)
-    found = opening(arms(size), standing(arms(size), moved, np.array([tilt, 0.0, 0.0])))
+    found = opening(arms(size), displaced(arms(size), moved, np.array([tilt, 0.0, 0.0])))
     assert found.gap == pytest.approx(np.linalg.norm(moved), rel=1e-9)
     assert found.angle == pytest.approx(tilt, rel=1e-9)
 
 
 def test_coupling_that_is_off_by_an_angle_opens_by_that_angle_and_by_no_distance():
-    """A geared arm is turned by 0.3 rad about its hinge; arms of 2 m round by up to ten units."""
+    """One of two geared arms is turned by 0.3 rad about its hinge, which allows this, and the other one
+    stands. The gap is the rounding of arms of 2 m, at most ten units."""
     scene = arms(2.0, coupled=True)
-    found = opening(scene, standing(scene, np.zeros(3), np.array([0.0, 0.0, 0.3])))
+    found = opening(scene, displaced(scene, np.zeros(3), np.array([0.0, 0.0, 0.3])))
     assert found.gap < 10 * np.finfo(float).eps * 2.0 and found.angle == pytest.approx(0.3, rel=1e-9)
 
 
 def test_gap_of_a_run_whose_positions_are_not_numbers_is_infinite():
     """NaN would compare as smaller than every limit."""
     scene = arms(1.0)
-    assert opening(scene, standing(scene, np.full(3, np.nan), np.zeros(3))).gap == math.inf
+    assert opening(scene, displaced(scene, np.full(3, np.nan), np.zeros(3))).gap == math.inf

@@ -21,6 +21,7 @@ FAILING = "tests.helpers.still_engines:FAILING"
 
 @pytest.fixture(autouse=True)
 def _own_children() -> Iterator[None]:
+    """End the child processes that a test leaves idle."""
     yield
     end_idle()
 

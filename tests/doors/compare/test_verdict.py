@@ -29,6 +29,7 @@ TRUTH = {"kind": "reference", "bound": 3e-14, "reason": "", "until": 1.0, "secon
 
 
 def record(engine: str, family: str, error: float | None, seconds=0.1, **more: Any) -> dict[str, Any]:
+    """Return the record of a completed run with its error and CPU time, with ``more`` fields or others."""
     found = {"scene": REDUNDANT.name, "engine": engine, "family": family, "version": "1", "versions": {}}
     found |= {"outcome": "COMPLETED", "message": "", "t_end": 1.0, "times": [], "time_limit": 60.0}
     found |= {"settings": {"seconds": seconds}, "cost": asdict(Cost(seconds)), "machine": {"cpu": "a"}}
@@ -38,6 +39,7 @@ def record(engine: str, family: str, error: float | None, seconds=0.1, **more: A
 
 
 def failed(engine: str, family: str, t_end: float = 0.0) -> dict[str, Any]:
+    """Return the record of a run that is no longer finite at a time."""
     return record(engine, family, None, outcome="NOT_FINITE", t_end=t_end)
 
 
@@ -49,11 +51,12 @@ RECORDS = (
 
 
 def group(records=RECORDS, scene=REDUNDANT, **known: Any) -> Judged:
+    """Return records of a scene with TRUTH, of which ``known`` changes fields."""
     return Judged(scene, {"scene": scene.name, **TRUTH, **known}, records)
 
 
 @pytest.mark.parametrize(
-    ("error", "verdict"),
+    ("error", "expected"),
     [
         (1e-8, Grade.RIGHT),
         (1.1e-8, Grade.INACCURATE),
@@ -62,13 +65,15 @@ def group(records=RECORDS, scene=REDUNDANT, **known: Any) -> Judged:
         (None, Grade.UNJUDGED),
     ],
 )
-def test_grade_follows_from_the_error_of_a_completed_run(error, verdict):
-    """Right up to 1e-8 of the length, wrong above 1e-2; a run that did not complete has failed."""
-    assert grade(record("a", "b", error)) is verdict
+def test_grade_follows_from_the_error_of_a_completed_run(error, expected):
+    """Documented limits: right up to 1e-8 of the length, wrong above 1e-2. Without an error a run is
+    unjudged, and one that did not complete has failed."""
+    assert grade(record("a", "b", error)) is expected
     assert grade(record("a", "b", error, outcome="TIMED_OUT")) is Grade.FAILED
 
 
-TUNED, COMPILED = "tuned", "newton, compiled"
+# parts of SITUATIONS, whose names say what the records are for
+TUNED, COMPILED = "tuned", "newton, compiled"  # families: an engine's own integrator, and crosscheck's
 UNKNOWN = {"kind": "", "bound": None, "until": 0.0, "reason": "it starts in a singular position"}
 CUT = {"kind": "reference", "reason": "singular", "until": 0.3, "both": False}
 OTHER_MECHANISM = {"mujoco": "change of velocity: truth and mujoco differ by 0.317 (allowed 1e-04)"}
@@ -119,7 +124,8 @@ SITUATIONS = {
 
 @pytest.mark.parametrize("situation", SITUATIONS)
 def test_verdict_of_a_situation_has_the_sentences_of_the_snapshot(situation, snapshot):
-    """The snapshot has the sentences for the records of SITUATIONS, whose errors and times they state."""
+    """The snapshot has the sentences on the records of SITUATIONS. Their errors and times are those that the
+    records above give; whether the sentences are true of them was judged by reading."""
     groups = SITUATIONS[situation]
     said = {"headline": headline(groups), "right": right(groups), "fast": fast(groups)}
     assert {**said, "breaks": breaks(groups), "truth": truth(groups)} == snapshot
@@ -133,15 +139,18 @@ def test_defaults_without_a_truth_are_not_judged(snapshot):
 
 
 def test_runs_that_end_at_the_start_of_an_unknown_motion_are_not_judged():
-    """At t = 0 every run agrees with the scene; this error of zero is no verdict on it."""
+    """Of an unknown motion the start alone is known. There every run agrees with the scene, so that ENDED, a
+    run that ends there with an error of zero, judges no engine, alone or beside runs without an error. Of a
+    known motion it does."""
     completed = [{**record(n, TUNED, None), "times": [0.0, 1.0]} for n in ("mbref", "mujoco")]
     assert not any(group([ENDED, *more], **UNKNOWN).is_judged for more in ([], completed))
     assert group([ENDED]).is_judged
 
 
 def test_engine_that_moves_another_mechanism_is_not_judged():
-    """MuJoCo agrees with the truth to 4e-9, and is among the fast ones, but for its short motion, which
-    differs: then speed and ends leave it out."""
+    """MuJoCo's run agrees with the truth to 4e-9, and the sentences on speed and on ends name MuJoCo. If the
+    check of models has found that MuJoCo moves another mechanism, they leave it out, and the run has no
+    grade."""
     [found] = SITUATIONS["another mechanism"]
     assert "MuJoCo" in fast([group()]) and "MuJoCo" in breaks([group()])
     assert "MuJoCo" not in fast([found]) and "MuJoCo" not in breaks([found])
@@ -149,7 +158,8 @@ def test_engine_that_moves_another_mechanism_is_not_judged():
 
 
 def test_distance_of_two_runs_is_measured_only_at_equal_times():
-    """a and b are off the truth by 1e-3 and 2e-3 of the length, so 1e-3 apart; c has other times."""
+    """a and b are off the truth by 1e-3 and 2e-3 of the length in one direction, so 1e-3 apart. c has the
+    positions of a at other times, and is compared with neither."""
     first, second = (synthetic.record(name, "x", error, 0.1) for name, error in (("a", 1e-3), ("b", 2e-3)))
     scene, other = synthetic.scene(), {**first, "engine": "c", "times": [0.5 * t for t in first["times"]]}
     found = Judged(scene, {}, [first, second, other]).agreement()
@@ -195,8 +205,8 @@ def test_errors_below_the_truth_s_bound_are_drawn_at_the_bound():
 
 
 def test_tables_of_eighty_columns_print_numbers_whole_and_no_end_time_that_is_rounding():
-    """Each number stands whole in both tables, of comparison and of runs. The end time -1e-8 s of a run that
-    failed at its start is rounding, and is not printed, nor is a zero in its place."""
+    """Each number of two long records stands whole in both tables, of the comparison and of the runs. A run
+    that failed at its start has the end time -1e-8 s, by rounding: neither it nor a zero is printed."""
     errors = {"error": 2.71e-5, "error_bound": 1e-14, "energy_error": 2.5e-12}
     own = partial(record, "pinocchio", "defaults", None, metrics={**errors, "violation_position": 1.13e-13})
     long = [

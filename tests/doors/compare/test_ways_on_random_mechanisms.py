@@ -12,6 +12,7 @@ from mbref.records import rewrite
 from tests.helpers.falling_engine import ENGINE, STONE
 
 FACTORS = {"right": 1.0, "heavy": 1.5, "also right": 1.0}  # of gravity, by the name of a way
+DIGITS = 2e-3  # relative; differences are stored with three digits
 
 
 def falls() -> dict:
@@ -21,22 +22,23 @@ def falls() -> dict:
 
 
 def test_differences_of_ways_are_relative_to_the_larger_acceleration_and_gauss_names_the_wrong_way():
-    """Accelerations g and 1.5 g differ by a third of the larger one; Gauss's principle gives g."""
+    """Accelerations g and 1.5 g differ by a third of the larger one. Gauss's principle gives g, so that the
+    way with 1.5 g is off by half of the right acceleration."""
     found = falls()
     sizes = {(first, second): size for first, second, size, *_ in found["pairs"]}
     assert sizes == {
-        ("right", "heavy"): pytest.approx(1 / 3, rel=2e-3),
+        ("right", "heavy"): pytest.approx(1 / 3, rel=DIGITS),
         ("right", "also right"): 0.0,  # equal numbers
-        ("heavy", "also right"): pytest.approx(1 / 3, rel=2e-3),
+        ("heavy", "also right"): pytest.approx(1 / 3, rel=DIGITS),
     }
     right = pytest.approx(0.0, abs=1e-14)  # 50 roundings
-    assert found["off"] == {"right": right, "heavy": pytest.approx(0.5, rel=2e-3), "also right": right}
+    assert found["off"] == {"right": right, "heavy": pytest.approx(0.5, rel=DIGITS), "also right": right}
     assert found["ended"] == dict.fromkeys(FACTORS, "")
 
 
 def test_command_names_pairs_above_their_limit_whose_cause_is_not_listed(tmp_path, capsys):
-    """A stone falls with g or with 1.5 g: a difference of a third of the larger, above the limit of 1e-3. No
-    finding is of the engine "stone"."""
+    """A stone falls with g or with 1.5 g: a difference of a third of the larger, above the limit of 1e-3. The
+    list of causes has none for an engine "stone"."""
     record = {"key": "stone 0", "engine": "stone", "version": "1.0", "seed": 0, "scene": STONE.name}
     record |= {"bodies": 1, "clearance": 1.0, "redundant": 0, "refused": "", "groups": [falls()]}
     rewrite(path := tmp_path / "records.jsonl", [record])
@@ -56,8 +58,8 @@ def test_every_tenth_mechanism_is_large(number, fewest, most):
 
 
 def test_each_difference_above_a_limit_in_the_stored_records_has_a_cause():
-    """Causes are listed in a file, by engine and ways. No record lacks one, each listed cause is needed, and
-    the findings that they name exist."""
+    """A file lists causes by engine and ways. The records of all engines need exactly these causes, and each
+    finding that a cause names exists."""
     shown = {each.cause for each in above(engines(read()))}
     assert shown == set(causes())
     assert {cause.finding for cause in causes()} - {""} <= {finding.name for finding in findings()}
