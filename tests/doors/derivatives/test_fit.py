@@ -14,7 +14,8 @@ MOST_DEVIATIONS = 4.0  # standard errors; a normal error is larger once in 16 00
 
 @pytest.mark.slow
 def test_planted_spring_is_found_from_a_noisy_angle_to_its_standard_errors():
-    """A pendulum's three numbers, put in 20 % wrong, from its angle with normal errors of 1e-3 rad."""
+    """The scene's own stiffness, natural angle and mass, ``true``, are found from 20 % more, by the angle of
+    its exact run with normal errors of 1e-3 rad."""
     scene, times = MOTIONS["pendulum with torsion spring"](), np.linspace(0.02, 0.5, 60)
     column = mbref.simulate(scene, times=times).columns("A.angle")
     column["A.angle"] += np.random.default_rng(3).normal(scale=NOISE, size=times.size)
@@ -24,7 +25,7 @@ def test_planted_spring_is_found_from_a_noisy_angle_to_its_standard_errors():
         rough = rough.with_(number, 1.2 * value)
     found = mbref.fit(rough, column, list(true))
     assert found.converged
-    assert found.deviations["A.angle"] == pytest.approx(NOISE, rel=0.3)  # 60 samples: 9 % by chance
+    assert found.deviations["A.angle"] == pytest.approx(NOISE, rel=0.3)  # by chance 1 / √(2 · 60) = 9 %
     for number, value in true.items():
         assert abs(found.numbers[number] - value) <= MOST_DEVIATIONS * found.errors[number]
 
@@ -42,9 +43,9 @@ def test_command_names_the_combination_that_an_angle_does_not_determine(tmp_path
 
 
 def test_constant_column_counts_no_more_than_others():
-    """The angle has the mass 1.3 kg, and is fitted from 1.5 kg. A position across the plane, 0.1 m instead of
-    0, is constant, so that its standard deviation, a weight, is rounding. Noise-free fits are exact to
-    1e-6."""
+    """The measured angle is of a pendulum of 1.3 kg; the fit begins at 1.5 kg. A second column, a position
+    across the plane, is constant at 0.1 m where the scene has 0, so that no mass fits it, and its deviation
+    by which columns are weighted is rounding. A fit of a column without noise is exact to 1e-6."""
     times, wrong = np.array([0.1, 0.2, 0.3]), pendulum().with_("body[bob].mass", 1.5)
     columns = mbref.simulate(pendulum(), times=times).columns("A.angle")
     found = mbref.fit(wrong, {**columns, "bob.position.z": np.full(3, 0.1)}, ["body[bob].mass"])

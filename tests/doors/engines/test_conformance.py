@@ -64,7 +64,8 @@ def test_verify_fails_an_engine_that_prints_and_rests_where_a_body_falls(capsys)
 
 
 def test_an_endless_run_in_this_process_times_out_and_leaves_no_timer():
-    """The engine loops for ever and catches every Exception; the next run has its own 0.1 s."""
+    """The engine loops for ever and catches every Exception. It ends after its 0.1 s, and the next run, of
+    another scene, completes within its own 0.1 s."""
 
     class Endless(Fake):
         def act(self, scene):
@@ -123,8 +124,8 @@ def test_verify_refuses_an_unknown_scene_with_status_two(capsys):
 
 
 def test_table_of_verdicts_has_a_line_for_each_scene():
-    """A line has the numbers of passed and failed checks, and of ones outside their range, and the check that
-    is nearest to its limit: of the door 5e-7 of 1e-6. The pendulum's failed check is named."""
+    """Of the door two checks pass, one is outside its range, and "truth" is nearest to its limit, with 5e-7
+    of 1e-6. Of the pendulum one check fails, whose name is given. Counts of zero are left blank."""
     verdicts = [
         suite.Verdict("truth", "door", "pass", 5e-7, 1e-6),
         suite.Verdict("closure", "door", "pass", 1e-9, 1e-6),
@@ -138,8 +139,8 @@ def test_table_of_verdicts_has_a_line_for_each_scene():
 
 
 def test_tables_of_verdicts_end_with_the_failures_and_a_summary():
-    """One check fails, one is refused (cannot) and one passes, on two scenes that run and one that does
-    not."""
+    """Of three scenes the door fails a check, the spring is refused ("cannot"), and the pendulum passes. A
+    scene that is not refused counts as run."""
     verdicts = [
         suite.Verdict("run", "door", "fail", reason="it crashed"),
         suite.Verdict("refusal", "spring", "cannot", reason="no springs"),
@@ -151,8 +152,8 @@ def test_tables_of_verdicts_end_with_the_failures_and_a_summary():
 
 
 def test_coordinate_partitioning_passes_the_check_in_millimetres():
-    """The check compares the motion of a scene whose lengths are in millimetres. Their rounding is 1000 times
-    as large, and Newton's method of the partitioning has to end above it."""
+    """The check compares the motion with that of the same scene in millimetres. Rounding of its numbers is
+    1000 times as large, and Newton's method of the partitioning has to end above it."""
     specimen, family = SPECIMENS["drawn loop"], "mpi-svd+partitioning"
     bench = trial.set_up(InProcess(engine("mbref")), specimen, family)
     verdict = suite.verdict_on("in millimetres", bench)

@@ -13,7 +13,7 @@ from crosscheck.study.grid import Case, study
 from tests.helpers.still_engines import LONG, resting
 
 TIMES, SETTING = np.array([0.0, 1.0]), Setting("plain", {})
-MOST = 2000  # characters that a message may have
+MOST = 2000  # characters; more than any message has after it is cut
 
 
 @pytest.mark.parametrize("name", ["TALKATIVE", "FAILING"])
@@ -30,7 +30,7 @@ def test_record_has_the_beginning_of_a_message_of_10_megabytes(name: str, tmp_pa
 
 @pytest.mark.parametrize("name", ["TALKATIVE", "FAILING"])
 def test_message_is_cut_alike_in_this_process_and_in_a_child_process(name: str):
-    """Either process keeps fewer than 2000 of its 10 million characters."""
+    """Either process keeps fewer than MOST of its 10 million characters."""
     called = f"tests.helpers.still_engines:{name}"
     own = InProcess(engine(called), called).observe(resting("rest"), TIMES, SETTING).value
     assert own.message == run_isolated(called, resting("rest"), TIMES, SETTING, 60.0).message
