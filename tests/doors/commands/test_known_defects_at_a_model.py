@@ -32,7 +32,8 @@ def said(options: Mapping[str, Any], remedy: Mapping[str, Any], **conditions: An
 
 
 def test_defect_is_reported_where_its_remedy_mends_the_accelerations():
-    """The stone falls with 1.5 g, off by (1.5 - 1) g of g; with the remedy it falls with g."""
+    """The stone falls with 1.5 g, so that its acceleration is off by 0.5 of the right one; the remedy, the
+    factor 1, lets it fall with g."""
     (sentence,) = said({"factor": 1.5}, {"factor": 1.0}, versions=["1.0"])
     assert "1.0 falls too fast and is wrong there: set factor = 1" in sentence
     assert "off by 0.5 of the largest, otherwise by 0" in sentence
@@ -50,15 +51,16 @@ def test_defect_is_reported_where_its_remedy_mends_the_accelerations():
     ids=["remedy changes nothing", "remedy makes it wrong", "other version", "no loop", "no hinge"],
 )
 def test_no_defect_is_reported_without_improvement_or_where_its_conditions_fail(options, remedy, conditions):
-    """Factors are of gravity. The engine has the version 1.0, and the stone neither loops nor joints."""
+    """Factors multiply gravity, so that 1 is right. The engine has the version 1.0, and the stone has neither
+    loops nor joints."""
     assert said(options, remedy, **conditions) == []
 
 
 WITH = {one.name: one for one in findings() if one.when}
 
 
-def turned(name: str) -> Scene:
-    """Return a four-bar of the findings, turned in space or not."""
+def of_findings(name: str) -> Scene:
+    """Return a four-bar whose file is stored beside the findings."""
     return Scene.from_file(resources.files(crosscheck.findings) / f"{name}.toml")
 
 
@@ -92,7 +94,7 @@ def three_links() -> Scene:
 
 # a mechanism that meets the conditions of a finding and has it, and one that meets them without having it
 MODELS: dict[str, tuple[Scene | Path, Scene]] = {
-    "dart-hinge-closure-turned": (turned("hinged_four_bar_turned"), turned("ball_four_bar")),
+    "dart-hinge-closure-turned": (of_findings("hinged_four_bar_turned"), of_findings("ball_four_bar")),
     "mujoco-sparse-jacobian-of-loops": (CHAINS, four_bar()),
     "pinocchio-lcaba-typical-mu": (three_links(), four_bar()),
     "pinocchio-pgs-converged-too-early": (welded(), three_links()),

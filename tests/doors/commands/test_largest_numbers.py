@@ -10,7 +10,7 @@ from crosscheck.cli.request import RequestError
 from mbref.cli import main as mbref
 from tests.helpers.still_engines import resting
 
-HUGE = ("99999999999999999999", "9" * 5000, "-1", "0.5", "many")
+NO_COUNTS = ("99999999999999999999", "9" * 5000, "-1", "0.5", "many")
 COUNTS = {
     ("run", "four_bar", "--samples"): "from 2 to 1000000",
     ("compare", "four_bar", "--samples"): "from 2 to 1000000",
@@ -48,11 +48,12 @@ def ended(capsys: pytest.CaptureFixture[str], *command: str) -> tuple[object, st
     return status, capsys.readouterr().err
 
 
-@pytest.mark.parametrize("text", HUGE, ids=lambda text: f"{text[:6]} ({len(text)})")
+@pytest.mark.parametrize("text", NO_COUNTS, ids=lambda text: f"{text[:6]} ({len(text)})")
 @pytest.mark.parametrize("command", COUNTS, ids=" ".join)
 def test_count_outside_its_range_is_refused_with_the_range(command: tuple[str, ...], text: str, capsys):
-    """COUNTS has the range of each option, HUGE the numbers. The last line of the error is a screen's width
-    or two long, also for a number of 5000 digits, of which 40 are shown."""
+    """COUNTS has the range of each option; NO_COUNTS are too large, negative, a fraction and a word. The last
+    line of the error is a screen's width or two long, also for a number of 5000 digits, of which 40 are
+    shown."""
     status, said = ended(capsys, *command, text)
     assert status == 2
     assert f"{command[-1]}: must be a whole number {COUNTS[command]}, got {text[:40]}" in said
@@ -61,8 +62,8 @@ def test_count_outside_its_range_is_refused_with_the_range(command: tuple[str, .
 
 @pytest.mark.parametrize(("command", "text"), [(c, text) for c in RANGES for text in RANGES[c][1]])
 def test_number_outside_its_range_is_refused_with_the_range(command: str, text: str, capsys):
-    """RANGES has the option's range and numbers outside of it. An error is relative to the mechanism's
-    length, so at most 1. The number is shown as it was given, or with six digits."""
+    """RANGES has the option's range and numbers outside of it. Errors are relative to the mechanism's length,
+    so that their limits are at most 1. The number is shown as it was given, or with six digits."""
     *words, option = command.split()
     status, said = ended(capsys, *words, f"{option}={text}")
     beginning = f"{option}: must be {RANGES[command][0]}, got "

@@ -60,8 +60,8 @@ def wait_for(what: Any) -> Any:
 
 
 def test_script_of_a_proof_ends_when_the_command_that_runs_it_is_killed(tmp_path: Path):
-    """The script writes its process number and sleeps 600 s. SIGKILL ends its parent; within 60 s, on a
-    loaded machine, the script's process has ended, too."""
+    """The script writes its process number and sleeps 600 s. SIGKILL ends its parent; then the script's
+    process ends, too, within PATIENCE and so long before its sleep is over."""
     pid_file = tmp_path / "number"
     script = SLEEPER.format(path=str(pid_file))
     parent = subprocess.Popen(

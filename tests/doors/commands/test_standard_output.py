@@ -23,7 +23,7 @@ PRINTING = [
     ("program", "words"), PRINTING, ids=lambda x: x if isinstance(x, str) else " ".join(x)
 )
 def test_output_to_a_full_disk_ends_with_one_sentence(program, words, capsys):
-    """Linux refuses each byte that is written to /dev/full for want of space."""
+    """Linux refuses each byte that is written to /dev/full, with the error of a full disk."""
     with open("/dev/full", "w") as full, redirect_stdout(full):
         assert PROGRAMS[program](words) == 2
     assert capsys.readouterr().err == "standard output: No space left on device\n"
@@ -54,7 +54,8 @@ def test_errors_print_no_control_character_of_a_word_of_the_command_line(program
 
 
 def test_errors_print_no_control_character_of_a_scene_file(tmp_path, capsys):
-    """An escape character stands behind a value, or in a key, of which the message would quote it."""
+    """In one file an escape character follows a value, in the other one it is part of a key. A message that
+    quoted the line or the key would print it."""
     (tmp_path / "faulty.toml").write_text('name = "x" \x1b[31m\n')
     (tmp_path / "key.toml").write_text('"na\\u001bme" = "x"\n')
     for name in ("faulty", "key"):
