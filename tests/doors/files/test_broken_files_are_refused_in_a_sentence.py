@@ -14,7 +14,7 @@ MODEL = """<sdf version="1.9"><model name="m"><link name="a"><pose>0 0 7 0 0 0</
 <inertial><mass>1</mass><inertia><ixx>2</ixx><iyy>2</iyy><izz>2</izz></inertia></inertial></link>
 <joint name="j" type="revolute"><parent>world</parent><child>a</child>
 <axis><xyz>0 1 0</xyz><dynamics><damping>3</damping></dynamics></axis></joint></model></sdf>"""
-PLACES = [
+PLACES = [  # a right file, its name, a text in it, the text with another number, and the part that has it
     (BODY, "a.xml", 'mass="1"', 'mass="{}"', "body 'a'"),
     (BODY, "a.xml", 'diaginertia="2 2 2"', 'diaginertia="{0} {0} {0}"', "body 'a'"),
     (BODY, "a.xml", "0 0 1", "0 0 {}", "body 'a'"),
@@ -92,8 +92,8 @@ def test_a_file_in_utf_16_is_read_with_the_names_of_its_links(files):
 
 @pytest.mark.parametrize("deep", [300, 5000])
 def test_elements_nested_too_deep_are_refused_with_their_depth(files, deep):
-    """``deep`` elements and the root are one level more; in SDF the link in the innermost model is
-    another."""
+    """In URDF, ``deep`` nested elements stand in the root, which is one level more. In SDF, ``deep`` nested
+    models stand in the root, and the innermost one has a link: two levels more."""
     urdf = ROBOT.replace("</robot>", f"{'<more>' * deep}{'</more>' * deep}</robot>")
     assert f"nested {deep + 1} deep; at most 200 are read" in files.refusal(urdf, "a.urdf")
     models = "".join(f"<model name='m{k}'><link name='l'/>" for k in range(deep)) + "</model>" * deep
@@ -103,10 +103,8 @@ def test_elements_nested_too_deep_are_refused_with_their_depth(files, deep):
 
 def test_a_chain_of_300_links_or_bodies_is_refused_with_its_length(files):
     """Links in URDF, bodies in MJCF."""
-    many, joint = (
-        300,
-        '<joint name="j{0}" type="continuous"><parent link="l{0}"/><child link="l{1}"/></joint>',
-    )
+    many = 300
+    joint = '<joint name="j{0}" type="continuous"><parent link="l{0}"/><child link="l{1}"/></joint>'
     links = "".join(f'<link name="l{k}"/>' for k in range(many + 1))
     joints = "".join(joint.format(k, k + 1) for k in range(many))
     said = files.refusal(f'<robot name="r">{links}{joints}</robot>', "a.urdf")

@@ -52,7 +52,8 @@ def refused(capsys: pytest.CaptureFixture[str], place: Path) -> str:
 
 @pytest.mark.parametrize("content", FOREIGN, ids=lambda content: ascii(content[:8]))
 def test_records_file_of_other_content_is_named(content, tmp_path, capsys):
-    """Null, deep or other JSON, no UTF-8, an escape character: `report --render` and `diff` refuse them."""
+    """Null, nested, empty or foreign JSON, bytes that are no UTF-8, and an escape character. Both commands of
+    ``refused`` refuse each of them."""
     assert "holds no records" in refused(capsys, folder(tmp_path / "r", content))
 
 
@@ -81,7 +82,7 @@ def test_record_whose_parts_do_not_fit_is_named(field, value, said, tmp_path, ca
 LACKING = b'{"key": "k1", "scene": "four_bar"}\n'
 
 
-BESIDE = {  # faulty content of a file beside right records, and words of the fault
+BESIDE = {
     "no numbers in timings": ("timings.jsonl", LACKING, "record 'k1': seconds: field required"),
     "no truth": ("truths.jsonl", LACKING, "record 'k1': kind: field required"),
     "no motion": ("motions.jsonl", LACKING, "record 'k1': engine: field required"),
@@ -94,7 +95,8 @@ BESIDE = {  # faulty content of a file beside right records, and words of the fa
 
 @pytest.mark.parametrize(("name", "content", "says"), BESIDE.values(), ids=BESIDE)
 def test_faulty_file_beside_right_records_is_named_with_its_fault(name, content, says, tmp_path, capsys):
-    """LACKING is a line with only a key and a scene; other contents are no JSON."""
+    """BESIDE has the name and the content of the file, and words of the fault. LACKING is a line with only a
+    key and a scene; other contents are no JSON."""
     place = folder(tmp_path / "r", record_with("seed", 0))
     (place / name).parent.mkdir(exist_ok=True)
     (place / name).write_bytes(content)
@@ -172,7 +174,8 @@ of_each_table = pytest.mark.parametrize(
 
 @of_each_table
 def test_table_of_records_names_a_record_that_it_cannot_show(command, record, tmp_path, capsys):
-    """The record is of a mechanism or experiment that is not in the table."""
+    """The record is right, and of a mechanism or experiment that is not in the table: the table is printed,
+    and a line names the record."""
     lost = {**record, "key": "k2", "engine": "none", "row": "none, tuned", "experiment": "none"}
     assert table(command, tmp_path, lost) == 0
     assert capsys.readouterr().err == "no row and column of the table has record 'k2'\n"
@@ -199,7 +202,7 @@ def test_table_of_a_missing_file_of_records_is_an_error(command, tmp_path, capsy
 
 
 def test_records_of_another_mechanism_than_the_scene_file_are_named_and_not_left_out(tmp_path, capsys):
-    """A record has the digest of its mechanism; here the digest differs from the digest of the only scene."""
+    """A record has the digest of its mechanism, which here is not that of the scene file beside it."""
     place = folder(tmp_path / "report", record_with("mechanism", "0123456789abcdef"))
     assert report(["--render", str(place)]) == 2
     assert "records of four_bar are of another mechanism" in capsys.readouterr().err

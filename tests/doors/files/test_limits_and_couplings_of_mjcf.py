@@ -25,11 +25,15 @@ LIMITED = """<mujoco><compiler angle="radian"/><worldbody>
         ("range='-1 0'", "", "up", "joint 's'"),
         ("range='0.1 1'", "", "up", "joint 's'"),
     ],
+    ids=[
+        *("gravity lengthens the rope", "speed lengthens the rope", "rope too long, speed shortens it"),
+        *("gravity lowers the slide", "speed raises the slide", "slide too low, speed raises it"),
+    ],
 )
 def test_a_limit_that_acts_at_the_start_is_refused_or_left_out_on_request(files, joint, tendon, key, name):
-    """The slide is at 0 m and the rope 0.5 m long. Gravity, or the speed of the keyframe "down", lengthens
-    the rope and lowers the slide; "up" does the opposite. ``name`` is the part whose limit this motion
-    meets."""
+    """The slide is at 0 m and the rope 0.5 m long. Gravity from rest, or the keyframe "down", lowers the
+    slide and lengthens the rope; the keyframe "up" does the opposite. A limit acts if the start is at it and
+    the motion goes beyond it, or if the start is beyond it, whatever the motion. ``name`` is its part."""
     text, words = LIMITED.format(joint=joint, tendon=tendon), ("--keyframe", key) if key else ()
     said = files.refusal(text, "a.xml", *words)
     assert f"limit of {name}, which acts at the start" in said and "--without limits" in said
@@ -45,9 +49,10 @@ def test_a_limit_that_acts_at_the_start_is_refused_or_left_out_on_request(files,
         ("range='-1 0'", "", ""),
         ("range='0 1' limited='false'", "", ""),
     ],
+    ids=["rope shortens", "rope within", "slide rises", "slide falls", "switched off"],
 )
-def test_a_file_whose_motion_leaves_its_limits_at_the_start_is_imported(files, joint, tendon, key):
-    """The start is inside the limit, at it and moves away from it, or the limit is switched off."""
+def test_a_file_whose_limits_do_not_act_at_the_start_is_imported(files, joint, tendon, key):
+    """The start is at the limit and the motion leaves it, the start is within it, or it is switched off."""
     text, words = LIMITED.format(joint=joint, tendon=tendon), ("--keyframe", key) if key else ()
     scene, out = files.scene(text, "a.xml", *words)
     assert [body.name for body in scene.body] == ["bob"] and "(--without limits)" not in out
@@ -67,8 +72,10 @@ COUPLED = """<mujoco><compiler angle="radian"/><worldbody>
 
 @pytest.mark.parametrize("kinds", ["couplings,armature,springs,damping", "everything"])
 def test_without_leaves_out_and_names_only_parts_that_a_scene_cannot_have(files, kinds):
-    """A scene has couplings of joints and armatures of hinges, which stay: a quadratic coupling of tendons
-    and the parts of a ball joint are left out. A file with parts that --without does not name is refused."""
+    """A scene can have the coupling "line" of joints and the armature of the hinge ja: they stay, although
+    --without names their kinds. It cannot have the quadratic coupling "curve" of tendons, nor armature,
+    stiffness and damping of the ball joint jd: they are left out and listed. If --without names couplings
+    and armature alone, the file is refused for stiffness and damping."""
     said = files.refusal(COUPLED, "a.xml", "--without", "couplings,armature")
     assert re.findall(r"^(\w+) of joint 'jd'", said, re.M) == ["stiffness", "damping"] and "curve" not in said
     scene, out = files.scene(COUPLED, "a.xml", "--without", kinds)
@@ -79,7 +86,8 @@ def test_without_leaves_out_and_names_only_parts_that_a_scene_cannot_have(files,
 
 
 def two_cranks(size: float, tilt: float = 0.0, rod: float = 1.1) -> str:
-    """Two cranks of a length (m), joined by a rod, all about z but for a tilt (rad) of the rod's hinge."""
+    """Return two cranks of a length ``size`` (m) with pivots as far apart, and a rod of ``rod`` lengths
+    between them. All hinges are about z, except for a tilt (rad) of the rod's hinge."""
     s, inertia = size, size * size * 0.01
     mass = f"mass='1' diaginertia='{inertia} {inertia} {inertia}'"
     return f"""<mujoco><compiler angle="radian"/><worldbody>
@@ -93,9 +101,9 @@ def two_cranks(size: float, tilt: float = 0.0, rod: float = 1.1) -> str:
 
 
 def test_an_open_loop_is_closed_alike_at_every_size(files):
-    """The first crank, of length s, keeps its angle of 0.6 rad: its middle is at s / 2 (-sin, cos), to 1e-9,
-    where the search ends. Closing magnifies this ten times in the other places, which are proportional to s.
-    One degree of freedom remains."""
+    """The first crank, of length s, keeps the given angle of 0.6 rad: its middle is at s / 2 (-sin, cos). The
+    search ends at errors of 1e-9 s. Those of the other places, which are proportional to s, may be ten times
+    as large. One degree of freedom remains."""
     found = []
     for size in (1e-4, 1e-2, 1.0, 1e2, 1e5):
         scene, out = files.scene(two_cranks(size), "a.xml", "--pose", "ja=0.6")

@@ -49,7 +49,8 @@ def named(name: str) -> Scene:
 
 
 def test_file_names_of_different_names_differ_and_are_safe_words_of_a_shell(tmp_path):
-    """`shlex.quote` leaves safe words and plain names as they are; it quotes ü, which shells do not."""
+    """A word is safe if `shlex.quote` leaves it as it is, except for ü, which it quotes and shells need not.
+    The file name of a plain name, "four_bar-2", is the name itself."""
     found = {file_name(name) for name in NAMES}
     assert len(found) == len(NAMES) and file_name("four_bar-2") == "four_bar-2"
     for name in found:
@@ -122,7 +123,8 @@ def test_figures_of_a_report_show_a_name_letter_by_letter():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_printed_commands_of_a_report_name_the_scene_file_as_one_word(name):
-    """`shlex.split` reads commands as a shell does: of a run's card, of the report, for another path."""
+    """`shlex.split` reads a command as a shell does. The command of a run's card and the one of the report
+    name the scene's file; `command` writes the run's command for a file at another path."""
     group = SceneRuns(synthetic.scene().with_(name=name), [Run({**synthetic.records()[0], "scene": name})])
     blocks = [*sections.records.render([group]), *sections.provenance.render([group])]
     printed = [card.command for block in blocks if isinstance(block, Record) for card in block.cards]

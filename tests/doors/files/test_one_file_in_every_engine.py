@@ -108,8 +108,8 @@ def test_corpus_means_what_the_specification_says(form: str, tmp_path: Path):
 
 @pytest.mark.parametrize("step", [6, pytest.param(1, marks=pytest.mark.slow)], ids=["few", "all"])
 def test_own_import_builds_the_machine_of_each_file_of_the_corpus(step: int, tmp_path: Path):
-    """A scene has neither limits nor friction. NOT_OURS are files whose import lists a part that is left
-    out."""
+    """The machine is the file's except for limits and friction of joints, which no scene has. Files of
+    NOT_OURS have springs, dampers or couplings by polynomials, which the import leaves out."""
     for case in (case for case in CASES[::step] if case.name not in NOT_OURS):
         path = written(tmp_path, case.text, case.file)
         own = Own().load(path, case.form).machine()
@@ -174,19 +174,16 @@ TREES = {
 
 DAMPED = {  # trees, also with a ball and a free joint, a loop and a coupling, each with dampers
     **{name: carried_by(joint) for name, joint in TREES.items()},
-    **{
-        kind: one_equality(kind).replace('"elbow"', '"elbow" damping="0.3"', 1)
-        for kind in ("connect", "joint")
-    },
+    **{k: one_equality(k).replace('"elbow"', '"elbow" damping="0.3"', 1) for k in ("connect", "joint")},
 }
 
 
 @pytest.mark.parametrize("is_damped", [True, False], ids=["its file", "a file without dampers"])
 @pytest.mark.parametrize("text", DAMPED.values(), ids=DAMPED)
 def test_mujoco_accelerates_as_the_file_and_dampers_it_does_not_read_are_named(text, is_damped, tmp_path):
-    """Accelerations at random states, as MuJoCo finds them. It reads the file, or one from which the dampers
-    are taken away: then the joints with dampers are named, and the field damping. 1e-9 is the error of
-    differences of order four."""
+    """MuJoCo's accelerations at random states are compared with those of the file's meaning, which come from
+    differences of order four and are right to 1e-9. If MuJoCo reads the file, none differs. If it reads the
+    file without dampers, each joint that has one is named with the field "damping"."""
     file = file_of(written(tmp_path, text))
     read = text if is_damped else re.sub(' damping="[^"]*"', "", text)
     engine = Mujoco().load(written(tmp_path, read, "engine.xml"), MJCF)
@@ -199,7 +196,8 @@ def test_mujoco_accelerates_as_the_file_and_dampers_it_does_not_read_are_named(t
 
 @pytest.mark.parametrize("kind", ["connect", "joint"])
 def test_constraint_rows_of_mujoco_are_the_files_at_four_closed_poses(kind, tmp_path):
-    """The file has a loop or a coupling of joints. Poses are closed to 1e-11; 1e-9 is allowed."""
+    """The file has a loop or a coupling of joints. The four poses obey it to 1e-11, and rows may differ by
+    1e-9."""
     file = file_of(path := written(tmp_path, DAMPED[kind]))
     rows = [Mujoco().load(path, MJCF).rows(pose) for pose in file.asked.closed]
     match = matched(file.machine, file.machine, DOUBLE)
@@ -208,10 +206,10 @@ def test_constraint_rows_of_mujoco_are_the_files_at_four_closed_poses(kind, tmp_
 
 @pytest.mark.parametrize("what", [pytest.param("ball", marks=pytest.mark.slow), "free", "connect", "joint"])
 def test_motion_is_mbrefs_and_mujocos(what: str, tmp_path: Path):
-    """Two independent runs of 0.1 s from a random state that obeys equalities: our import by mbref, and
-    MuJoCo in small steps."""
+    """Runs of 0.1 s from a random state that obeys the equalities end where those of the file's own meaning
+    do: our import by mbref to 1e-7, and MuJoCo in small steps, whose equalities are soft, to 1e-3."""
     file = file_of(written(tmp_path, carried_by(TREES[what]) if what in TREES else one_equality(what)))
-    for reader, tolerance in ((Own(), 1e-7), (Mujoco(), 1e-3)):  # MuJoCo's equalities are soft
+    for reader, tolerance in ((Own(), 1e-7), (Mujoco(), 1e-3)):
         found = built(reader, file.path, MJCF, file.asked)
         assert found.ends and found.accelerations
         assert differences(matched(file.machine, found.machine, DOUBLE), file, found, DOUBLE) == []
@@ -303,8 +301,9 @@ def test_unknown_reader_of_files_is_refused_with_the_nearest_name(tmp_path: Path
 
 
 def test_own_import_reads_public_files_of_robots_or_refuses_them_by_name():
-    """At least 60 files of 12 packages: the machine is the same except for limits and friction of joints, or
-    words refuse the file. They name no place of the machine that read them."""
+    """The stored records are of at least 60 files of 12 packages. Each file gives the same machine except for
+    limits and friction of joints, or is refused in words, which name no folder of the computer that read
+    it."""
     found = [record for record in public.read() if record["reader"] == "mbref"]
     assert len(found) >= 60 and len({record["package"] for record in found}) >= 12
     for record in found:

@@ -33,7 +33,8 @@ def sdf(*parts: str, version: str = "1.6") -> str:
 
 @pytest.mark.parametrize("name", ["world", "arm", "hand", "__model__"])
 def test_a_joint_without_a_pose_is_at_its_child_link_whatever_its_name(files, name):
-    """The format's default pose. "world" and "__model__" also name frames, "arm" and "hand" links."""
+    """The format places such a joint at its child, here the hand at (0.9, 0.2, 0) m. The joint's name must
+    not be taken for a frame ("world", "__model__") or a link ("arm", "hand") of the same name."""
     text = sdf(
         link("arm", "0.5 0 0 0 0 0"),
         link("hand", "0.9 0.2 0 0 0 0"),
@@ -55,8 +56,9 @@ def test_a_joint_without_a_pose_is_at_its_child_link_whatever_its_name(files, na
     ],
 )
 def test_an_axis_is_in_the_frame_of_the_model_by_the_rule_of_its_version(files, version, given, axis):
-    """Up to version 1.4 an axis was in the model's frame, later in the joint's, here turned by π/2 about z,
-    unless use_parent_model_frame said otherwise. Version 1.7 took this element away, which a note says."""
+    """Up to version 1.4 an axis is in the model's frame, since then in the joint's, which is here turned by
+    π/2 about z. In versions 1.5 and 1.6 use_parent_model_frame selects the model's; later versions have no
+    such element, and a note says that it is not read."""
     arm = link("arm", f"0.5 0 0 0 0 {math.pi / 2!r}")
     shoulder = joint("shoulder", "revolute", "world", "arm", "1 0 0", inside=given)
     scene, notes = files.scene(sdf(arm, shoulder, version=version), "arm.sdf")
@@ -104,7 +106,8 @@ def test_joints_of_a_mimic_with_an_offset_start_at_angles_that_obey_it(files):
     ("ratio", "reference", "offset"), [(3, 0.1, 0.3), (0.1, 0.7, 0.07), (-1.1, 1.1, -1.21)]
 )
 def test_an_offset_of_a_mimic_joint_that_is_only_rounding_is_exactly_zero(files, ratio, reference, offset):
-    """The coupling's offset is offset - ratio · reference, here only rounding of binary numbers."""
+    """The coupling's offset is offset - ratio · reference. In decimals it is zero here, as 0.3 - 3 · 0.1 is;
+    in binary numbers it would be a rounding."""
     scene, _ = files.scene(pair(mimics("lead", ratio, offset, reference)), "pair.sdf")
     assert scene.coupling[0].offset == 0.0
 
@@ -144,6 +147,7 @@ def hanging(limit: str, kind: str = "revolute") -> str:
         ("<lower>-inf</lower><upper>inf</upper>", "revolute"),
         ("<lower>-1e16</lower><upper>1e16</upper>", "prismatic"),
     ],
+    ids=["turns away from the lower", "falls away from the upper", "infinite", "default"],
 )
 def test_a_limit_that_does_not_act_at_the_start_is_left_out_with_a_remark(files, limit, kind):
     """Joints start at 0, and the body falls to larger angles or smaller displacements, away from a limit at
@@ -159,9 +163,11 @@ def test_a_limit_that_does_not_act_at_the_start_is_left_out_with_a_remark(files,
         ("<lower>0.1</lower><upper>1</upper>", "revolute"),
         ("<lower>0</lower><upper>0</upper>", "revolute"),
     ],
+    ids=["falls beyond the upper", "falls beyond the lower", "starts beyond the lower", "no range"],
 )
 def test_a_limit_that_acts_at_the_start_is_refused_or_left_out_on_request(files, limit, kind):
-    """The body falls against the limit, or starts beyond it."""
+    """A joint starts at 0, and gravity turns the revolute one to larger values and moves the prismatic one to
+    smaller ones: against a limit at 0. A start beyond a limit violates it, whatever the motion."""
     text = hanging(limit, kind)
     assert "limit of joint 'j', which acts at the start" in files.refusal(text, "a.sdf")
     assert "(--without limits)" in files.scene(text, "a.sdf", "--without", "limits")[1]

@@ -85,15 +85,17 @@ def numbers(data):
 
 @pytest.mark.parametrize(("path", "text", "number"), VALUES, ids=[path for path, *_ in VALUES])
 def test_number_with_a_unit_is_the_number_in_si_to_the_last_digit(path, text, number):
-    """A scene with the text has the numbers of a scene with the SI number; factors with π may round once
-    more, by 2.3e-16."""
+    """A scene with the text has the numbers of a scene with the SI number of VALUES. If the factor has π, the
+    product may be rounded once more, by 2.3e-16."""
     read, right = (numbers(PRESS.with_(path, value).to_dict()) for value in (text, number))
     for mine, other in zip(read, right, strict=True):
         assert mine == other or math.isclose(mine, other, rel_tol=2.3e-16)
 
 
 def test_every_number_may_have_a_unit_except_directions_and_pure_numbers():
-    """The schema allows a text wherever a number may have a unit."""
+    """The schema allows a text wherever a number may have a unit. ``pure`` lists pure numbers: quaternions,
+    coefficients that multiply a load, and coefficients of restitution. Fields of joints that begin with "ax"
+    are directions."""
     whole = schema()
     fields = {
         f"{table}.{field}"
@@ -137,7 +139,8 @@ def grid(*bounds, points=8):
 
 
 def solid(shape):
-    """Return points (n, 3) and volumes (n,) over a shape of the axis z, exact for moments of second order."""
+    """Return points (n, 3) and volumes (n,) by which sums over a shape with the axis z are integrals, exact
+    for moments of second order."""
     if shape["type"] == "box":
         return grid(*((-edge / 2, edge / 2) for edge in shape["size"]))
     if shape["type"] == "sphere":
@@ -199,6 +202,7 @@ NO_WALL = {"type": "tube", "radius": 0.1, "inner_radius": 0.1}
     ],
 )
 def test_shape_that_gives_no_inertia_is_refused(fields, message):
-    """An unknown shape, a size of zero, a missing field, mass and density at once or neither of them."""
+    """An unknown shape, a size of zero, a missing field, a tube without wall, mass and density at once or
+    neither of them, an inertia beside a shape, and a density without a volume or a shape."""
     with pytest.raises(SceneError, match=r"body\[b\]\..*" + message):
         Scene(name="s", body=[{"name": "b", "position": [0, 0, 0], **fields}])

@@ -41,8 +41,9 @@ UNKNOWN = PLACES.replace('child link="c"', 'child link="q"')
     ],
 )
 def test_an_element_that_closes_a_loop_is_a_joint_of_the_scene(files, tag, kind, axes, freedoms):
-    """A parallelogram of links of 0.3 m with the crank at 1.2 rad: the tip is at 0.3 (1 + cos, 0, sin) m, to
-    1e-9 m. The mechanism has one freedom, with a fixed joint none."""
+    """A parallelogram of links of 0.3 m with the crank at 1.2 rad above x: the tip, at which the element
+    joins b and c, is at 0.3 (1 + cos, 0, sin) m. The mechanism has one freedom, with a fixed joint none. The
+    loop is closed to 1e-9 m."""
     turn = ' rpy="0 -1.2 0"' if kind == "fixed" else ""
     places = PLACES.replace('<parent_origin xyz="0.3 0 0"', f'<parent_origin xyz="0.3 0 0"{turn}')
     loop = f'<{tag} name="tip" type="{kind}">{places}{axes}</{tag}>'
@@ -92,10 +93,12 @@ def test_a_moment_of_inertia_larger_than_the_two_others_together_is_refused(file
 
 @pytest.mark.parametrize("excess", [0.0, 1e-16, 1e-13, 1e-10])
 def test_inertia_of_a_flat_link_is_read_though_rounding_makes_it_impossible(files, excess):
-    """A flat link has 0.3 = 0.1 + 0.2 kg m²; the largest moment is greater by a relative ``excess``."""
+    """A flat link has 0.3 = 0.1 + 0.2 kg m². A file may have a largest moment that is greater by a relative
+    ``excess``, which no body has; the moments are read as those of a flat link, to 1e-9 of the
+    largest."""
     moments = f'ixx="0.1" ixy="0" ixz="0" iyy="{0.3 * (1 + excess)!r}" iyz="0" izz="0.2"'
     scene, _ = files.scene(robot(*CRANKS).replace(MOMENTS, moments, 1), "r.urdf")
-    assert np.diag(scene.body[0].inertia) == pytest.approx(np.diag([0.1, 0.3, 0.2]), rel=1e-8, abs=1e-8)
+    assert np.diag(scene.body[0].inertia) == pytest.approx(np.diag([0.1, 0.3, 0.2]), abs=3e-10)
 
 
 def test_prefix_without_a_declaration_is_read_as_by_parsers_without_namespaces(files):
