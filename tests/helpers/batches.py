@@ -1,4 +1,5 @@
-"""Pairs of scenes of one structure whose numbers decide which constraint rows are independent; results."""
+"""Pairs of scenes of one structure whose numbers decide which constraint rows are independent, and all
+numbers of a run."""
 
 from mbref.motions.motion import Motion
 from mbref.scene import Body, Force, Revolute, Scene, Spring, Translational
@@ -26,28 +27,24 @@ def crank_with(force: tuple[float, float, float], **changes) -> Scene:
     )
 
 
-def rail(point: tuple[float, float, float], stiffness: float = 20.0, inertia: float = 0.02) -> Scene:
-    """A slide on an arm, pulled by a spring at a point that may turn both out of their plane."""
-    body = {"mass": 1.0, "position": (0.3, 0.0, 0.0)}
+def rail(across: float, inertia: float = 0.02) -> Scene:
+    """A slide on an arm, pulled by a spring to a point at the height ``across`` (m) over their plane and by a
+    force of as many N across it: both tend to turn arm and slide out of the plane."""
+    middle, above = (0.3, 0.0, 0.0), (0.3, 0.5, across)
     return Scene(
         name="rail",
         duration=0.5,
         body=(
             Body(name="arm", mass=1.0, inertia=(0.01, 0.02, 0.02), position=(0.1, 0.0, 0.0)),
-            Body(name="slide", inertia=(inertia, inertia, inertia), **body),
+            Body(name="slide", mass=1.0, inertia=(inertia, inertia, inertia), position=middle),
         ),
         joint=(
             Revolute(name="pin", bodies=("ground", "arm"), anchor=(0.0, 0.0, 0.0), axis=Z),
-            Translational(name="guide", bodies=("arm", "slide"), anchor=(0.3, 0.0, 0.0), axis=X),
+            Translational(name="guide", bodies=("arm", "slide"), anchor=middle, axis=X),
         ),
         load=(
-            Spring(
-                bodies=("ground", "slide"),
-                points=((0.3, 0.5, point[2]), (0.3, 0.0, 0.0)),
-                stiffness=stiffness,
-                natural_length=0.3,
-            ),
-            Force(body="slide", point=(0.3, 0.0, 0.0), force=point),
+            Spring(bodies=("ground", "slide"), points=(above, middle), stiffness=20.0, natural_length=0.3),
+            Force(body="slide", point=middle, force=(0.0, 0.0, across)),
         ),
     )
 
@@ -59,6 +56,6 @@ NUMBERS_DECIDE = {
         SPATIAL.with_(body=tuple(b.model_copy(update={"angular_velocity": None}) for b in SPATIAL.body)),
         SPATIAL.with_("body[crank].angular_velocity", (0.0, 3.0, 0.0)),
     ],
-    "a spring out of the plane": [rail((0.0, 0.0, 0.0)), rail((0.0, 0.0, 0.2))],
-    "no moment of inertia": [rail((0.0, 0.0, 0.2)), rail((0.0, 0.0, 0.2), inertia=0.0)],
+    "a spring out of the plane": [rail(0.0), rail(0.2)],
+    "no moment of inertia": [rail(0.2), rail(0.2, inertia=0.0)],
 }

@@ -55,13 +55,8 @@ def main() -> None:
     for name in sys.argv[1:] or [n for n in MOTIONS if n not in known]:
         known[name] = exact(MOTIONS[name]())
         print(f"{name}: {known[name]['by']}, bound {known[name]['bound']:.1e}", flush=True)
-        STORED.write_text(
-            "{\n"
-            + ",\n".join(
-                f"{json.dumps(k)}: {json.dumps(v)}" for k, v in sorted(known.items()) if k in MOTIONS
-            )
-            + "\n}\n"
-        )
+        lines = (f"{json.dumps(k)}: {json.dumps(v)}" for k, v in sorted(known.items()) if k in MOTIONS)
+        STORED.write_text("{\n" + ",\n".join(lines) + "\n}\n")
 
 
 if __name__ == "__main__":

@@ -242,14 +242,9 @@ class Scalars(Fake):
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         good = super().run(scene, times, setting)
         cost = Cost(np.float32(0.5), np.float64(0.1), np.int64(7))
-        return replace(
-            good,
-            t_end=np.float64(good.t_end),
-            cost=cost,
-            settings={"seconds": np.float64(0.5)},
-            velocity=good.velocity.tolist(),
-            bodies=list(good.bodies),
-        )
+        lists = {"velocity": good.velocity.tolist(), "bodies": list(good.bodies)}
+        settings = {"seconds": np.float64(0.5)}
+        return replace(good, t_end=np.float64(good.t_end), cost=cost, settings=settings, **lists)
 
 
 class Elsewhere(Fake):

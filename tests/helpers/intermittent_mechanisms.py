@@ -16,7 +16,8 @@ SHARE = 0.6  # fraction of the joints without drivers, couplings and armatures t
 
 
 def carts(**latch: Any) -> Scene:
-    """Two carts of 1 kg and 3 kg on a line, at 2 m/s and -1 m/s, that latch at 0.1 s and let go at 0.3 s."""
+    """Two carts of 1 kg and 3 kg on a line, at 2 m/s and -1 m/s, that latch at 0.1 s and let go at 0.3 s;
+    other fields of the latch may be given."""
     return Scene(
         name="carts",
         duration=0.5,

@@ -22,7 +22,7 @@ from mbref.scene import (
 
 AXIS = np.array([1.0, 2.0, 2.0]) / 3
 MASS, STIFFNESS, DAMPING, REST = 2.0, 50.0, 3.0, 0.2
-MOMENT, TORQUE, WAVE = 0.4, 0.7, Sine(amplitude=1.5, frequency=4.0, phase=0.3)
+INERTIA, TORQUE, WAVE = 0.4, 0.7, Sine(amplitude=1.5, frequency=4.0, phase=0.3)
 CUBIC = Polynomial([1.0, -2.0, 3.0, -0.8])
 TIMES = (0.0, 0.2, 0.7, 1.1, 1.6, 2.3)
 TABLE = tuple((t, float(CUBIC(t))) for t in TIMES)  # a spline of a cubic polynomial is that polynomial
@@ -37,7 +37,7 @@ def slide(*loads: object) -> Scene:
 
 
 def sprung_slide() -> Scene:
-    """A block between the ground and a spring with damper."""
+    """The block of ``slide`` with a spring and a damper along its slide."""
     return slide(SlideSpring(joint="J", stiffness=STIFFNESS, damping=DAMPING, natural_displacement=REST))
 
 
@@ -56,17 +56,17 @@ def pushed(factor: Factor) -> Scene:
 
 def wheel() -> Scene:
     """A wheel on a hinge through its centre that a sinusoidal torque turns."""
-    body = Body(name="wheel", mass=1.0, inertia=(0.3, 0.3, MOMENT), position=(0.0, 0.0, 0.0))
+    body = Body(name="wheel", mass=1.0, inertia=(0.3, 0.3, INERTIA), position=(0.0, 0.0, 0.0))
     hinge = Revolute(name="J", bodies=("ground", "wheel"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
     torque = JointTorque(joint="J", torque=TORQUE, factor=Factor(sine=WAVE))
     return Scene(name="wheel", duration=2.0, body=[body], joint=[hinge], load=[torque])
 
 
 def turned(t: np.ndarray) -> np.ndarray:
-    """Return the angle (rad) of the wheel at rest at the start: φ'' = M A sin(ωt + p) / I."""
+    """Return the angle (rad) of ``wheel``, at rest at the start: φ'' = M A sin(ωt + p) / I."""
     w, phase = WAVE.frequency, WAVE.phase
     rise = np.cos(phase) * t / w - (np.sin(w * t + phase) - np.sin(phase)) / w**2
-    return np.asarray(TORQUE * WAVE.amplitude / MOMENT * rise)
+    return np.asarray(TORQUE * WAVE.amplitude / INERTIA * rise)
 
 
 def thrown() -> Scene:

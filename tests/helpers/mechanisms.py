@@ -23,6 +23,7 @@ def loaded(seed: int) -> Scene:
     return random_scenes.with_loads_of_joints(random_mechanism(seed), seed, switched=True)
 
 
+# makers of mechanisms from a seed
 RANDOM: dict[str, Callable[[int], Scene]] = {
     "random": random_mechanism,
     "mechanism": random_scenes.mechanism,
@@ -33,7 +34,6 @@ RANDOM: dict[str, Callable[[int], Scene]] = {
     "geared": geared_mechanism,
     **{name: partial(awkward, name) for name in AWKWARD},
 }
-"""Makers of mechanisms from a seed."""
 
 
 def named() -> dict[str, list[Scene]]:

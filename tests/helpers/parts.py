@@ -23,7 +23,8 @@ def block(name: str, position: Point, mass: float = 1.5, **fields: Any) -> Entry
 
 
 def rod(name: str, start: Point, stop: Point, mass: float = 1.0) -> Entry:
-    """Return a rod between two points of the plane z = constant; its axes are the world's."""
+    """Return a rod of length l between two points: moments of inertia m l² / 12 across it and m l² / 1000
+    about it. Its axes are the world's."""
     (x, y, z), (u, v, w) = start, stop
     length = np.linalg.norm(np.subtract(stop, start))
     across, thin = mass * length**2 / 12, 1e-3 * mass * length**2
@@ -50,14 +51,9 @@ def slide(name: str, first: str, second: str, at: Point, axis: Point = X, **fiel
 
 
 def spring(
-    first: str,
-    start: Point,
-    second: str,
-    stop: Point,
-    stiffness: float,
-    natural_length: float,
+    first: str, start: Point, second: str, stop: Point, stiffness: float, natural_length: float,
     damping: float = 0.0,
-) -> Entry:
+) -> Entry:  # fmt: skip
     """Return a spring between points of two bodies (m, at t = 0)."""
     ends = {"bodies": [first, second], "points": [start, stop], "natural_length": natural_length}
     return {"type": "spring", **ends, "stiffness": stiffness, "damping": damping}

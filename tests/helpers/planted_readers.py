@@ -1,4 +1,4 @@
-"""Readers of files that build the file's machine with one planted difference."""
+"""Readers of files with planted faults: one drops couplings and friction, one refuses a nameless model."""
 
 from __future__ import annotations
 

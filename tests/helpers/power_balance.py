@@ -1,6 +1,6 @@
-"""Power balance of a motion, from its outputs alone: work of drivers and loads against the change of energy.
-Gravity and springs store energy: the work of all drivers and loads is the change of kinetic plus potential
-energy, without the energy of the springs, whose power is a load's."""
+"""Power balance of a motion, from its outputs alone: the work of all drivers and loads is the change of the
+kinetic energy and of gravity's potential energy. Springs count as loads, whose power is part of the work, so
+that their energy is taken from the energy of the motion."""
 
 from collections.abc import Mapping
 

@@ -62,15 +62,9 @@ def _with_gimbal(scene: Scene, rng: Rng) -> Scene:
         Body(name="bob", mass=0.7, inertia=NOTHING, position=hanging),
         Body(name="carriage", mass=1.3, inertia=(0.02, 0.03, 0.04), position=place),
     )
-    carrier = scene.body[0].name
+    rail = {"bodies": (scene.body[0].name, "carriage"), "anchor": place}
     joints = (
-        Translational(
-            name="rail",
-            bodies=(carrier, "carriage"),
-            anchor=place,
-            axis=triple(rng.normal(size=3)),
-            armature=0.6,
-        ),
+        Translational(name="rail", **rail, axis=triple(rng.normal(size=3)), armature=0.6),
         Revolute(name="roll", bodies=("carriage", "link"), anchor=place, axis=(1.0, 0.0, 0.0), armature=0.03),
         Revolute(name="pitch", bodies=("link", "bob"), anchor=place, axis=(0.0, 1.0, 0.0)),
     )

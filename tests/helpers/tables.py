@@ -60,14 +60,8 @@ def switched_motor() -> Scene:
 
 def spinning_rod() -> Scene:
     """Return a rod that turns about a fixed axis without gravity, more than twice in a second."""
-    rod = Body(
-        name="rod",
-        mass=1.0,
-        inertia=(0.01, 0.1, 0.1),
-        position=(0.5, 0.0, 0.0),
-        velocity=(0.0, 8.0, 0.0),
-        angular_velocity=(0.0, 0.0, 16.0),
-    )
+    rates = {"velocity": (0.0, 8.0, 0.0), "angular_velocity": (0.0, 0.0, 16.0)}
+    rod = Body(name="rod", mass=1.0, inertia=(0.01, 0.1, 0.1), position=(0.5, 0.0, 0.0), **rates)
     hinge = Revolute(name="A", bodies=("ground", "rod"), anchor=(0, 0, 0), axis=(0, 0, 1))
     return Scene(name="spinning_rod", gravity=(0.0, 0.0, 0.0), duration=1.0, body=[rod], joint=[hinge])
 
