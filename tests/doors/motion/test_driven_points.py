@@ -23,9 +23,7 @@ SPLINE = CubicSpline(*np.array(ROWS).T)
 LAWS = {  # the driver's fields; its value and two derivatives (3, k)
     "sine": (
         {"polynomial": [0.0, -0.1], "sine": {"amplitude": 0.25, "frequency": 3.0}},
-        lambda t: np.array(
-            [0.25 * np.sin(3 * t) - 0.1 * t, 0.75 * np.cos(3 * t) - 0.1, -2.25 * np.sin(3 * t)]
-        ),
+        lambda t: np.array([np.sin(3 * t) / 4 - t / 10, 0.75 * np.cos(3 * t) - 0.1, -2.25 * np.sin(3 * t)]),
     ),
     "table": ({"table": ROWS}, lambda t: np.array([SPLINE(t, n) for n in range(3)])),
 }

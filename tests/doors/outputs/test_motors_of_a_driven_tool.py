@@ -1,10 +1,10 @@
 """Torques of motors that replace the drivers of a tool: virtual work, replays, refusals, singular positions.
 
-A 5R arm in a vertical plane has hinges A and E on the ground, elbows B and D, and the tool at P, which
-drivers move along a circle.
+The 5R arm of examples has hinges A and E on the ground, and its tool at P, which drivers move along a circle.
 """
 
 import functools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,18 +16,14 @@ from crosscheck.judge.gauss_principle import rank
 from mbref.cli.commands import main
 from mbref.scene import Driver, Factor, Free, JointTorque, Scene
 from tests.helpers.changed_scenes import in_another_order, in_other_units
-from tests.helpers.parts import hinge, rod, slide
 from tests.helpers.statics import DOWN, G
 
-INNER, OUTER, BASE, TOOL = 0.3, 0.45, 0.35, (0.2, 0.5)  # m
-RADIUS, SPEED = 0.06, 4.0  # m, rad/s, of the tool's circle
-MASSES = {"a": 1.0, "b": 0.8, "d": 0.7, "e": 1.1}  # kg
-DURATION = 2 * np.pi / SPEED
+ARM = Path(__file__).parents[3] / "examples" / "five_bar_arm.toml"
+INNER, OUTER, BASE, TOOL = 0.3, np.sqrt(0.08), 0.4, (0.2, 0.5)  # m
+SQUARES = np.array([0.3, 0.2828427]) ** 2 / 12  # m², moments of inertia of the rods over their masses
+MASSES = 1.0, 0.8  # kg, of an inner and an outer rod
+RADIUS, SPEED, DURATION = 0.05, np.pi, 2.0  # m, rad/s, of the tool's circle; s
 TIMES = np.linspace(0.0, DURATION, 7)
-CIRCLE = (
-    {"sine": {"amplitude": RADIUS, "frequency": SPEED}},
-    {"polynomial": [-RADIUS], "sine": {"amplitude": RADIUS, "frequency": SPEED, "phase": np.pi / 2}},
-)
 CLOSE = 1e-11  # of the largest torque or power
 
 
@@ -58,7 +54,7 @@ class Half:
         moved = v - INNER * turn * self.n
         return turn, moved, cross(self.w, moved) / OUTER**2
 
-    def virtual_work(self, v: np.ndarray, a: np.ndarray, e: np.ndarray, masses: tuple[float, float]) -> float:
+    def virtual_work(self, v: np.ndarray, a: np.ndarray, e: np.ndarray) -> float:
         """Return Σ m (r'' - g)·δr + J φ'' δφ of both rods for the tool's velocity, acceleration and virtual
         displacement e."""
         turn, moved, _ = self.rates(v)
@@ -70,30 +66,14 @@ class Half:
         up = np.array([0.0, G])
         inner = INNER / 2 * (second * self.n - turn**2 * self.u) + up
         outer = a - curved / 2 + up
-        of_inner = inner @ (INNER / 2 * by_inner * self.n) + INNER**2 / 12 * second * by_inner
-        of_outer = outer @ (e - by_w / 2) + OUTER**2 / 12 * bent * by_outer
-        return masses[0] * of_inner + masses[1] * of_outer
+        of_inner = inner @ (INNER / 2 * by_inner * self.n) + SQUARES[0] * second * by_inner
+        of_outer = outer @ (e - by_w / 2) + SQUARES[1] * bent * by_outer
+        return MASSES[0] * of_inner + MASSES[1] * of_outer
 
 
-def halves(p: np.ndarray) -> tuple[Half, Half]:
-    """Return the rods at A and at E."""
-    return Half(0.0, 1, p), Half(BASE, -1, p)
-
-
-@functools.cache
 def arm() -> Scene:
     """Return the arm with its drivers."""
-    b, d = ((*half.elbow.tolist(), 0.0) for half in halves(np.array(TOOL)))
-    p, a, e = (*TOOL, 0.0), (0.0, 0.0, 0.0), (BASE, 0.0, 0.0)
-    ends = {"a": (a, b), "b": (b, p), "d": (d, p), "e": (e, d)}
-    bodies = [rod(name, *pair, MASSES[name]) for name, pair in ends.items()]
-    places: dict = {"A": ("ground", "a", a), "B": ("a", "b", b), "P": ("b", "d", p), "D": ("d", "e", d)}
-    joints = [hinge(name, *of) for name, of in places.items()] + [hinge("E", "ground", "e", e)]
-    tool = [
-        {"name": f"tool {n}", "body": "b", "point": p, "along": along, **law}
-        for n, along, law in zip("xy", ((1, 0, 0), (0, 1, 0)), CIRCLE, strict=True)
-    ]
-    return Scene(name="arm", gravity=DOWN, duration=DURATION, body=bodies, joint=joints, driver=tool)
+    return Scene.from_file(ARM)
 
 
 @functools.cache
@@ -108,13 +88,12 @@ def demand(t: float) -> tuple[np.ndarray, np.ndarray]:
     s, c = np.sin(SPEED * t), np.cos(SPEED * t)
     p, v = np.array(TOOL) + RADIUS * np.array([s, c - 1]), RADIUS * SPEED * np.array([c, -s])
     a = -RADIUS * SPEED**2 * np.array([s, c])
-    left, right = halves(p)
+    left, right = Half(0.0, 1, p), Half(BASE, -1, p)
     jacobian, force = np.zeros((3, 2)), np.zeros(2)
     for k, e in enumerate(np.eye(2)):
         (one, _, outer), (other, _, last) = left.rates(e), right.rates(e)
         jacobian[:, k] = one, other, last - outer
-        force[k] = left.virtual_work(v, a, e, (MASSES["a"], MASSES["b"]))
-        force[k] += right.virtual_work(v, a, e, (MASSES["e"], MASSES["d"]))
+        force[k] = left.virtual_work(v, a, e) + right.virtual_work(v, a, e)
     return jacobian, force
 
 
@@ -143,23 +122,14 @@ def test_powers_of_motors_are_the_powers_of_the_drivers_that_they_replace():
 
 
 def test_torques_as_tables_move_the_free_arm_along_the_circle():
-    """401 rows of a cubic spline: the places differ by its error. The spline of a torque T sin(4 t + …) at a
-    distance h has an error of T (4 h)⁴ / 100, about 1e-9 T; 1e-7 m leaves room for its growth in a turn."""
-    dense = np.linspace(0.0, DURATION, 401)
-    found = mbref.inverse_dynamics(mbref.simulate(arm(), times=dense, rtol=1e-13), ["A", "E"])
-    start = moved()
-    bodies = [
-        body.model_copy(
-            update={
-                "velocity": tuple(start.velocity[0, k].tolist()),
-                "angular_velocity": tuple(start.angular_velocity[0, k].tolist()),
-            }
-        )
-        for k, body in enumerate(arm().body)
-    ]
-    rows = {n: list(zip(dense.tolist(), m.torque.tolist(), strict=True)) for n, m in found.motors.items()}
+    """401 rows of a cubic spline, for 0.5 s of the unstable arm. The spline of a torque T sin(π t) at a
+    distance h has an error of T (π h)⁴ / 384, about 2e-10 T; gravity makes it grow about a hundredfold."""
+    times, dense = np.linspace(0.0, 0.5, 6), np.linspace(0.0, DURATION, 401)
+    found = mbref.inverse_dynamics(mbref.simulate(arm(), times=dense, rtol=1e-13), ["A", "E"]).motors
+    rows = {n: list(zip(dense.tolist(), m.torque.tolist(), strict=True)) for n, m in found.items()}
     loads = [JointTorque(joint=n, torque=1.0, factor=Factor(table=rows[n])) for n in rows]
-    free = mbref.simulate(arm().with_(body=bodies, driver=(), load=loads), times=TIMES, rtol=1e-12)
+    start = mbref.simulate(arm(), times=times, rtol=1e-13)
+    free = mbref.simulate(start.scene_at(0.0).with_(driver=(), load=loads), times=times, rtol=1e-12)
     assert np.abs(free.position - start.position).max() < 1e-7
 
 
@@ -183,15 +153,12 @@ def test_torques_do_not_depend_on_units_and_order():
 
 def directions(scene: Scene, rng: np.random.Generator) -> list[Free]:
     """Return free joints in random directions at points of all bodies, six for each body."""
+    pairs = [(body, k) for body in scene.body for k in range(6)]
+    axes = rng.normal(size=(len(pairs), 3)).tolist()
+    places = (rng.normal(size=(len(pairs), 3)) + [body.position for body, _ in pairs]).tolist()
     return [
-        Free(
-            name=f"motor {body.name} {k}",
-            bodies=("ground", body.name),
-            anchor=tuple((np.array(body.position) + rng.uniform(-0.5, 0.5, 3)).tolist()),
-            axis=tuple(rng.normal(size=3).tolist()),
-        )
-        for body in scene.body
-        for k in range(6)
+        Free(name=f"{body.name} {k}", bodies=("ground", body.name), anchor=place, axis=axis)
+        for (body, k), place, axis in zip(pairs, places, axes, strict=True)
     ]
 
 
@@ -215,27 +182,12 @@ def test_forces_of_motors_of_random_mechanisms_are_those_of_the_judge(seed):
         assert np.abs(found[name].force - exact[name]).max() < 1e-9 * largest
 
 
-def slider_crank(*drivers: dict) -> Scene:
-    """Return a crank of 0.2 m and a rod of 0.5 m that move a block along x, at a dead centre at t = 0."""
-    bodies = [
-        rod("crank", (0.0, 0.0, 0.0), (0.2, 0.0, 0.0)),
-        rod("rod", (0.2, 0.0, 0.0), (0.7, 0.0, 0.0)),
-        rod("block", (0.7, 0.0, 0.0), (0.8, 0.0, 0.0)),
-    ]
-    joints = [
-        hinge("A", "ground", "crank", (0.0, 0.0, 0.0)),
-        hinge("B", "crank", "rod", (0.2, 0.0, 0.0)),
-        hinge("C", "rod", "block", (0.7, 0.0, 0.0)),
-        slide("D", "ground", "block", (0.7, 0.0, 0.0)),
-    ]
-    return Scene(name="slider_crank", gravity=DOWN, body=bodies, joint=joints, driver=drivers)
-
-
 def test_motor_at_the_slide_of_a_driven_crank_is_undecided_at_dead_centres_only():
     """The crank turns by π rad/s: dead centres at 0 s and 1 s. Elsewhere the force times the slide's speed is
     the crank's power."""
     times = np.array([0.0, 0.3, 0.6, 0.9, 1.0])
-    scene = slider_crank({"joint": "A", "polynomial": [0.0, np.pi]})
+    driver = Driver(joint="A", polynomial=(0.0, np.pi))
+    scene = mbref.find_scene("planar_slider_crank").with_(gravity=DOWN, load=(), driver=[driver])
     motion = mbref.simulate(scene, times=times, rtol=1e-13)
     motor, drive = mbref.inverse_dynamics(motion, ["D"]).motors["D"], motion.driver("A")
     assert np.isnan(motor.force).tolist() == [True, False, False, False, True]
@@ -244,32 +196,26 @@ def test_motor_at_the_slide_of_a_driven_crank_is_undecided_at_dead_centres_only(
     assert work == pytest.approx(drive.power[regular], rel=1e-9)
 
 
+BARE = [body.model_copy(update={"mass": None, "inertia": None}) for body in arm().body]
+RESTING = "with all of them at rest left arm, right arm, right can still move: 2 degrees of freedom"
+
+
 @pytest.mark.parametrize(
-    ("motors", "sentence"),
+    ("motors", "changes", "sentence"),
     [
-        (["A"], "t = 0 s; with all of them at rest b, d, e can still move: 2 degrees of freedom"),
-        (["A", "Q"], "no joint 'Q'; joints: A, B, P, D, E, tool x, tool y"),
-        (["A", "A"], "needs at least one joint, and each joint once"),
-        ([], "needs at least one joint"),
+        ("A", {}, RESTING),
+        ("AQ", {}, "no joint 'Q'; joints: A, B, P, D, E, tool x, tool y"),
+        ("AA", {}, "needs at least one joint, and each joint once"),
+        ("AE", {"driver": ()}, "no driver"),
+        ("AE", {"body": BARE}, "needs masses"),
     ],
 )
-def test_motors_that_cannot_cause_the_motion_are_refused(motors, sentence):
-    """One motor for two degrees of freedom; unknown joints; no joint."""
+def test_motors_that_cannot_cause_the_motion_are_refused(motors, changes, sentence):
+    """One motor for two degrees of freedom; unknown joints; nothing that motors could replace; no masses."""
+    motion = mbref.simulate(arm().with_(**changes), times=[0.0, 0.01])
     with pytest.raises(mbref.InputError) as refusal:
-        mbref.inverse_dynamics(moved(), motors)
+        mbref.inverse_dynamics(motion, [*motors])
     assert sentence in str(refusal.value)
-
-
-def test_scenes_without_drivers_or_masses_have_no_inverse_dynamics():
-    """The message says what is missing."""
-    scene = arm()
-    bare = [body.model_copy(update={"mass": None, "inertia": None}) for body in scene.body]
-    cases = ((scene.with_(driver=()), "no driver"), (scene.with_(body=bare), "needs masses"))
-    for changed, sentence in cases:
-        motion = mbref.simulate(changed, times=[0.0, 0.01])
-        with pytest.raises(mbref.InputError) as refusal:
-            mbref.inverse_dynamics(motion, ["A", "E"])
-        assert sentence in str(refusal.value)
 
 
 def test_command_writes_torques_of_motors_and_says_which_share_the_work(tmp_path, capsys):
@@ -279,11 +225,9 @@ def test_command_writes_torques_of_motors_and_says_which_share_the_work(tmp_path
     out = str(tmp_path / "arm.csv")
     assert main([*run, "A", "E", "--columns", "motor(A).torque", "motor(E)", "--out", out]) == 0
     table = np.genfromtxt(out, delimiter=",", names=True, deletechars="")
-    found = mbref.inverse_dynamics(moved(), ["A", "E"])
-    assert table["motor(A).torque"] == pytest.approx(found.motors["A"].torque, rel=1e-8)
-    assert table["motor(E).power"] == pytest.approx(
-        found.columns("motor(E).power")["motor(E).power"], rel=1e-8
-    )
+    found = mbref.inverse_dynamics(moved(), ["A", "E"]).columns()
+    for name in ("motor(A).torque", "motor(E).power"):
+        assert table[name] == pytest.approx(found[name], rel=1e-8)
     capsys.readouterr()
     assert main([*run, "A", "E", "P"]) == 0
     shown = capsys.readouterr().out
