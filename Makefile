@@ -48,7 +48,7 @@ machines: $(VENV)/ready ## the tests as on other processors: OpenBLAS' and numba
 
 coverage: $(VENV)/ready ## coverage of mbref, its kernels run as plain Python
 	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run --source=mbref -m pytest -q tests/properties \
-	    $(addprefix tests/mbref/test_,formulations.py counts.py scene.py kinematics.py)
+	    tests/contracts/test_formulations.py tests/doors/statics/test_counts.py tests/doors/files/test_scene.py
 	$(BIN)/coverage report
 
 report: $(VENV)/ready ## the whole comparison report, into report/

@@ -21,7 +21,7 @@ LIBRARIES += (
     *("scipy.sparse.linalg", "pydantic", "numba", "rich.progress"),
     *("jinja2", "matplotlib.figure", "mujoco"),
 )
-TESTS = ("tests/doors", "tests/mbref", "tests/crosscheck", "tests/properties", "tests/reports")
+TESTS = ("tests/doors", "tests/contracts", "tests/properties", "tests/reports")
 BUDGET = 60.0  # CPU s of the tests of a mutant
 
 

@@ -15,7 +15,7 @@ from packaging.utils import canonicalize_name
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Scene
-from tests.crosscheck.measured import MARGIN
+from tests.helpers.measured import MARGIN
 
 ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "examples"

@@ -17,11 +17,11 @@ from mbref.formats import ImportOptions
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene, SceneError
 from mbref.scenes import find_scene
-from tests.crosscheck.measured import MARGIN
+from tests.helpers.measured import MARGIN
 
 ALIKE = 6.1e-10  # measured difference of accelerations / the largest one; MARGIN of 10 for other processors
 
-MODELS = Path(__file__).parents[2] / "crosscheck" / "models"
+MODELS = Path(__file__).parent / "models"
 NAMES = ("four_bar", "five_bar", "delta_leg", "stewart_legs", "slider_crank", "scissor")
 EXPORTED = ("four_bar_gravity", "bennett", "andrews_squeezer", "flyball_governor", "sarrus")
 

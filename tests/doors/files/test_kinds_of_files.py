@@ -15,10 +15,10 @@ from crosscheck.files.matching import matched
 from crosscheck.files.reading import differences, file_of
 from mbref.formats import ImportOptions
 from mbref.scene import SceneError
-from tests.crosscheck.originals import apart
-from tests.crosscheck.test_importing import LUMP, hinge, read
+from tests.doors.files.test_importing import LUMP, hinge, read
+from tests.helpers.originals import apart
 
-KINDS = Path(__file__).parents[2] / "crosscheck" / "models" / "kinds"
+KINDS = Path(__file__).parent / "models" / "kinds"
 SAME = 1e-9  # of the largest distance moved, and of the largest entry of a matrix; worst measured 2e-11
 END = 0.02  # s, of the compared motions
 OPTIONS = {

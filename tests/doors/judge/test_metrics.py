@@ -15,8 +15,8 @@ from crosscheck.judge.truth import NoSolution, truth_for
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Moment
 from mbref.scenes import SCENES
-from tests.crosscheck.measured import MARGIN
-from tests.crosscheck.truth_scenes import SPRUNG, free, pendulum
+from tests.helpers.measured import MARGIN
+from tests.helpers.truth_scenes import SPRUNG, free, pendulum
 
 SCENE = SCENES["planar_slider_crank_gravity"]()
 TRUTH = truth_for(SCENE)

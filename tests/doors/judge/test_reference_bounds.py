@@ -12,7 +12,7 @@ from crosscheck.judge.reference.start_velocities import least_squares, start_vel
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref.scene import Scene, TorsionSpring
-from tests.crosscheck.measured import in_many_digits
+from tests.helpers.measured import in_many_digits
 
 SECONDS = 200.0
 QUICK = ("stiff_spring", "rounded_redundancy", "planes")

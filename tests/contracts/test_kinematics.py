@@ -1,0 +1,271 @@
+"""The judge's joint equations against difference quotients; its lengths, start velocities and counts of rows
+against sums by hand."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mbref
+from crosscheck.judge import constraints
+from crosscheck.judge.mobility import mobility
+from mbref import rotations
+from mbref.scene import (
+    GROUND,
+    JOINT_TYPES,
+    Body,
+    Cylindrical,
+    Distance,
+    Driver,
+    Revolute,
+    Scene,
+    SceneError,
+    Sine,
+    Spherical,
+)
+from mbref.scenes import SCENES
+from tests.helpers.coupled_mechanisms import coupled_loops, gear_pair, pendulum, screw
+from tests.helpers.truth_scenes import CLOSED
+
+AXIS = (0.3, -0.5, 0.8)
+SIDE = (0.8, 0.0, -0.3)  # perpendicular to AXIS
+POINT = (0.2, 0.7, -0.4)
+PAIR = ("first", "second")
+ROUNDED = 1e-14  # m or rad; some roundings of lengths up to 1.4 m
+H = 1e-5  # s, half the interval of central differences
+SLOPE, SLOPE_OF_RATES = 4e-9, 2e-8  # ten times the measured errors of these differences, of Φ' and of Φ''
+
+
+def tilted(*vector):
+    return tuple(rotations.from_vector(np.array(vector)).tolist())
+
+
+def jointed(kind, bodies=PAIR, driver=()):
+    """Return two bodies in general position with a joint of the given type."""
+    places = {"anchor": POINT, "anchors": (POINT, (1.0, 0.1, 0.3)), "axis": AXIS, "axes": (AXIS, SIDE)}
+    joint = JOINT_TYPES[kind].at("j", bodies, **places)
+    bodies = (
+        Body(name="first", position=(0.1, 0.2, 0.3), orientation=tilted(0.4, -0.2, 0.9)),
+        Body(name="second", position=(0.9, -0.4, 0.5), orientation=tilted(-0.7, 0.5, 0.1)),
+    )
+    return Scene(name=kind, body=bodies, joint=(joint,), driver=driver)
+
+
+def random_motion(given, seed):
+    """Return position, orientation, velocity and spin at t = 0 that satisfy joints and drivers, random within
+    them, and random accelerations (2, nb, 3), which satisfy nothing."""
+    rng = np.random.default_rng(seed)
+    pose = constraints.initial_poses(given)
+    j, b = constraints.jacobian(given, 0.0, *pose)
+    start = rng.normal(size=j.shape[1])
+    twist = (start + np.linalg.pinv(j) @ (b - j @ start)).reshape(-1, 6)
+    return (*pose, twist[:, :3], twist[:, 3:]), rng.normal(size=(2, len(given.body), 3))
+
+
+def moved(motion, accelerations, h):
+    """Return the motion h seconds later, exact to second order in h."""
+    position, orientation, velocity, spin = motion
+    linear, angular = accelerations
+    later = rotations.multiply(rotations.from_vector(h * spin + h**2 / 2 * angular), orientation)
+    return position + h * velocity + h**2 / 2 * linear, later, velocity + h * linear, spin + h * angular
+
+
+DRIVERS = {
+    "revolute": Driver(joint="j", polynomial=(0.0, 1.3, -0.7), sine=Sine(amplitude=0.4, frequency=2.0)),
+    "cylindrical": Driver(joint="j", polynomial=(0.0, -2.1)),
+    "translational": Driver(joint="j", polynomial=(0.0, 0.3, 0.5, 0.1)),
+}
+CASES = [*((kind, False) for kind in JOINT_TYPES), *((kind, True) for kind in DRIVERS)]
+
+
+@pytest.mark.parametrize("bodies", [PAIR, ("second", "ground")])
+@pytest.mark.parametrize(("kind", "driven"), CASES)
+def test_jacobian_is_finite_difference_of_closure(kind, bodies, driven):
+    """The rate of Φ(q, t) along random velocities u is J u - b. It equals the central difference of Φ to
+    4e-9, ten times the measured error of order h², with h = 1e-5 s."""
+    given = jointed(kind, bodies, (DRIVERS[kind],) if driven else ())
+    position, orientation = constraints.initial_poses(given)
+    velocity, spin = np.random.default_rng(5).normal(size=(2, len(given.body), 3))
+
+    def residual(t):
+        turned = rotations.multiply(rotations.from_vector(t * spin), orientation)
+        return constraints.closure(given, t, position + t * velocity, turned)["j"]
+
+    j, b = constraints.jacobian(given, 0.0, position, orientation)
+    difference, rate = (residual(H) - residual(-H)) / (2 * H), j @ np.hstack([velocity, spin]).ravel() - b
+    assert np.abs(difference - rate).max() < SLOPE, f"{kind}: {difference} against {rate}"
+
+
+@pytest.mark.parametrize("bodies", [PAIR, ("ground", "second")])
+@pytest.mark.parametrize(("kind", "driven"), CASES)
+def test_acceleration_residual_is_finite_difference_of_velocity_residual(kind, bodies, driven):
+    """Φ'' is the central difference of Φ' along velocities that the joint allows and random accelerations, to
+    2e-8: ten times the measured error of order h², with h = 1e-5 s."""
+    given = jointed(kind, bodies, (DRIVERS[kind],) if driven else ())
+    motion, accelerations = random_motion(given, 11)
+    after, before = (
+        constraints.closure_rates(given, t, *moved(motion, accelerations, t))["j"] for t in (H, -H)
+    )
+    difference = (after - before) / (2 * H)
+    residual = constraints.closure_accelerations(given, 0.0, *motion, *accelerations)["j"]
+    assert np.abs(difference - residual).max() < SLOPE_OF_RATES, f"{kind}: {difference} against {residual}"
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_initial_velocities_satisfy_joints_and_drivers(name):
+    """Rates of their residuals are below 4e-14 of the largest spin of a body, or of 1 rad/s: rounding."""
+    given = SCENES[name]()
+    velocity, spin = constraints.initial_twists(given)
+    rates = constraints.closure_rates(given, 0.0, *constraints.initial_poses(given), velocity, spin)
+    worst = {joint: np.abs(r).max() for joint, r in rates.items()}
+    assert max(worst.values()) < 4 * ROUNDED * max(1.0, np.abs(spin).max()), f"{name}: {worst}"
+
+
+@pytest.mark.parametrize("name", [n for n in CLOSED if SCENES[n]().body[0].angular_velocity is not None])
+def test_initial_velocities_keep_given_angular_velocities(name):
+    """Angular velocities of the scene file, which its joints allow, change by less than 1e-13 of the largest,
+    or of 1 rad/s: rounding."""
+    bodies = SCENES[name]().body
+    _, spin = constraints.initial_twists(SCENES[name]())
+    given = {k: each.angular_velocity for k, each in enumerate(bodies) if each.angular_velocity}
+    change = np.abs(spin[list(given)] - list(given.values())).max()
+    assert change < 10 * ROUNDED * max(1.0, np.abs(spin).max())
+
+
+def test_initial_velocities_that_are_not_given_minimise_the_kinetic_energy():
+    """The tip of a rod is given 1 m/s. An impulse p = 1 m/s / (1/m + r²/I) at the tip costs least energy: v =
+    p / m and ω = p r / I, with m = 2 kg, I = 0.4 kg m² and the tip r = 0.5 m from the centre. The tip's own
+    mass, 1e-9 kg, changes them by less than 1e-8."""
+    rod = Body(name="rod", mass=2.0, inertia=(0.3, 0.3, 0.4), position=(0.5, 0.0, 0.0))
+    tip = Body(name="tip", mass=1e-9, inertia=(1e-12,) * 3, position=(1, 0, 0), velocity=(0, 1, 0))
+    ball = Spherical(name="ball", bodies=("rod", "tip"), anchor=(1.0, 0.0, 0.0))
+    velocity, spin = constraints.initial_twists(Scene(name="pushed", body=(rod, tip), joint=(ball,)))
+    impulse = 1 / (1 / 2.0 + 0.25 / 0.4)
+    assert np.allclose(velocity[0], [0, impulse / 2, 0], atol=1e-8), f"{velocity[0]} against {impulse / 2}"
+    assert np.allclose(spin[0], [0, 0, impulse * 0.5 / 0.4], atol=1e-8), f"{spin[0]} against {impulse * 1.25}"
+
+
+def test_second_driver_of_a_four_bar_at_another_rate_is_refused():
+    """Both cranks of a parallelogram turn at the driver's rate. A second driver that turns the other crank
+    the other way, or 1 % faster, contradicts it; one at the driver's rate does not."""
+    four_bar = SCENES["four_bar"]()
+    rate = four_bar.driver[0].polynomial[1]
+    right, reversed_one, faster = (
+        four_bar.with_(driver=(*four_bar.driver, Driver(joint="D", polynomial=(0.0, other))))
+        for other in (rate, -rate, 1.01 * rate)
+    )
+    constraints.initial_twists(right)
+    for wrong in (reversed_one, faster):
+        with pytest.raises(SceneError, match=r"joint\[\d\] '[ABCD]': drivers contradict it: off by"):
+            constraints.initial_twists(wrong)
+
+
+@pytest.mark.parametrize("order", [("ground", "second"), ("second", "ground")])
+def test_coordinates_of_a_cylindrical_joint_count_its_full_turns(order):
+    """A body turns about the axis by 9 t + 3 sin 4 t, up to 21 rad, and slides by 0.4 t². Both are found to
+    1e-12, rounding of 21 rad; with the ground as second body they have the opposite sign."""
+    given, times = jointed("cylindrical", order), np.linspace(0.0, 2.0, 81)
+    angle, shift = 9.0 * times + 3 * np.sin(4 * times), 0.4 * times**2
+    axis = np.array(AXIS) / np.linalg.norm(AXIS)
+    turn = rotations.from_vector(angle[:, None] * axis)
+    position, orientation = constraints.initial_poses(given)
+    place = POINT + rotations.rotate(turn, position[1] - POINT) + shift[:, None] * axis
+    poses = np.stack([np.broadcast_to(position[0], place.shape), place], axis=1)
+    turned = rotations.multiply(turn, orientation[1])
+    frames = np.stack([np.broadcast_to(orientation[0], turned.shape), turned], axis=1)
+    spin = np.stack([0 * place, (9.0 + 12 * np.cos(4 * times))[:, None] * axis], axis=1)
+    sign = 1 if order[0] == "ground" else -1
+    found = constraints.joint_coordinates(given, times, poses, frames, spin)["j"]
+    assert np.abs(found - sign * np.stack([angle, shift], axis=1)).max() < 100 * ROUNDED
+
+
+O, X, Y, Z = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def body(name: str = "b", *place: float, **parts: Any) -> Body:
+    given = {"mass": 2.0, "inertia": (0.5, 0.3, 0.2), "position": place or O, **parts}
+    return Body(name=name, **given)
+
+
+def scene(*bodies: Body, **parts: Any) -> Scene:
+    return Scene(name="s", body=bodies, **{"gravity": O, **parts})
+
+
+def hinge(name: str = "A", first: str = "ground", second: str = "b", **parts: Any) -> Revolute:
+    return Revolute(name=name, bodies=(first, second), **{"anchor": O, "axis": Z, **parts})
+
+
+def test_scene_length_is_the_largest_distance_of_anchors_and_centres():
+    """Points (3, 4, 0) and the origin; (3, 4, 0) and (0, 0, -6), √(5² + 6²) apart; centres 7 m apart."""
+    bar = Distance(name="D", bodies=("ground", "b"), anchors=((0.0, 0.0, -6.0), (3.0, 4.0, 0.0)))
+    assert constraints.scene_length(scene(body("b", 3.0, 4.0, 0.0), joint=(hinge(),))) == 5.0
+    assert constraints.scene_length(scene(body("b", 3.0, 4.0, 0.0), joint=(bar,))) == math.hypot(5.0, 6.0)
+    assert constraints.scene_length(scene(body("a", 1.0, 0.0, 0.0), body("b", 1.0, 0.0, 7.0))) == 7.0
+
+
+@pytest.mark.parametrize(
+    ("parts", "more", "length"),
+    [
+        ({}, {}, 0.5),
+        ({"velocity": (3.0, 4.0, 0.0)}, {"duration": 2.0}, 5.0 * 2.0),
+        ({}, {"gravity": (0.0, -6.0, 8.0), "duration": 2.0}, 10.0 * 2.0**2 / 2),
+        ({"velocity": X}, {"gravity": (0.0, 0.0, 3.0), "duration": 2.0}, 1.0 * 2.0 + 3.0 * 2.0**2 / 2),
+        ({"velocity": (0.2, 0.0, 0.0)}, {}, 0.5),
+        ({"mass": None, "inertia": None}, {}, 1.0),
+        ({"mass": None, "inertia": None, "velocity": (0.0, 3.0, 0.0)}, {"duration": 0.5}, 3.0 * 0.5),
+    ],
+    ids=["at rest", "thrown", "falling", "thrown and falling", "slow", "massless at rest", "massless thrown"],
+)
+def test_length_of_a_single_body_is_its_way_or_its_radius_of_gyration(parts, more, length):
+    """The larger of the way v t + g t² / 2 over the duration, of 1 s unless given, and the radius of gyration
+    √(0.5 kg m² / 2 kg) = 0.5 m; the radius counts as 1 m for a body without mass."""
+    assert constraints.scene_length(scene(body(**parts), **{"duration": 1, **more})) == pytest.approx(length)
+
+
+PARTS = scene(
+    body("b", 1.0, 0.0, 0.0),
+    body("c", 3.0, 0.0, 0.0),
+    joint=(hinge("A"), Cylindrical(name="C", bodies=("ground", "c"), anchor=O, axis=X)),
+)
+POSE = constraints.initial_poses(PARTS)
+
+
+def test_joint_rates_are_spin_about_and_velocity_along_the_axis():
+    """b spins at 3 rad/s about z, A's axis; c at 1 rad/s about x, C's axis, along which it has 2 m/s."""
+    rates = constraints.joint_rates(PARTS, *POSE, np.array([O, (2.0, 5.0, 0.0)]), np.array([(0, 0, 3.0), X]))
+    assert rates["A"] == pytest.approx([3.0, 0.0]) and rates["C"] == pytest.approx([1.0, 2.0])
+
+
+def test_initial_velocity_off_a_hinge_is_rounded_up_to_five_percent_and_refused_above():
+    """A body at 3 m/s has 4 or 6 % of this speed along the hinge's axis, 0.12 or 0.18 m/s, which the hinge
+    forbids. Up to 5 % the judge takes for rounding."""
+    rounded, refused = (
+        scene(body("b", 2.0, 0.0, 0.0, velocity=(0.0, 3.0, along)), joint=(hinge(),))
+        for along in (0.12, 0.18)
+    )
+    assert constraints.initial_twists(rounded)[0][0] == pytest.approx([0.0, 3.0, 0.0])
+    with pytest.raises(SceneError, match=r"joint\[0\] 'A': the given velocities contradict it: off by 0.18"):
+        constraints.initial_twists(refused)
+
+
+@pytest.mark.parametrize("make", [gear_pair, screw, pendulum, coupled_loops])
+def test_coupling_is_a_constraint_row_and_an_armature_is_none(make):
+    """The judge's rows, redundant rows and freedoms are mbref's, except for rows of rotors: in mbref each
+    armature is a hidden body with six coordinates and as many rows."""
+    made = make()
+    counts, found = mbref.counts(made), mobility(made)
+    rotors = sum(bool(joint.armature) for joint in made.joint if hasattr(joint, "armature"))
+    assert found.degrees_of_freedom == counts.degrees_of_freedom and found.redundant == counts.redundant
+    assert found.rows == counts.rows - 6 * rotors
+
+
+def test_mobility_of_four_small_scenes_is_as_counted_by_hand():
+    """(rows, redundant rows, freedoms): a free body; a pendulum, by five rows; a boom that a rope holds; a
+    hinge and its copy, whose five rows are redundant."""
+    free = scene(body("b", 1.0, 0.0, 0.0))
+    rope = Distance(name="rope", bodies=(GROUND, "b"), anchors=(Z, X))
+    assert mobility(free) == (0, 0, 6)
+    assert mobility(free.with_(joint=[hinge(axis=Y)])) == (5, 0, 1)
+    assert mobility(free.with_(joint=[hinge(axis=Y), rope])) == (6, 0, 0)
+    assert mobility(free.with_(joint=[hinge("A"), hinge("B")])) == (10, 5, 1)

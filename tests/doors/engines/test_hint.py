@@ -1,0 +1,130 @@
+"""The hint for an engine that fails names the term of its equations that is wrong. The engines are the
+example engine with one known defect."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crosscheck.conformance.hint import Failure, hint
+from crosscheck.conformance.mechanisms.specimens import specimens
+from crosscheck.conformance.runners import InProcess
+from crosscheck.conformance.suite import held_against
+from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.equations_of_motion import accelerations, terms_at
+from crosscheck.judge.gauss_motion import gauss_motion
+
+PATH = Path(__file__).parents[3] / "examples" / "spatial_engine" / "spatial_engine.py"
+SPEC = importlib.util.spec_from_file_location("spatial_engine_with_defects", PATH)
+example = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(example)
+KNOWN = {specimen.scene.name: specimen for specimen in specimens()}
+
+
+class Defective(example.Mechanism):
+    """Equations of the example engine with one ``defect``: "gravity" is left out or has 102 %, "gyroscopic"
+    moments ω × Jω, accelerations of a "driver" or a "moment" have the opposite sign, "gamma" (of J a = γ)
+    lacks its velocity terms, the last body's "inertia" has 101 %."""
+
+    defect = ""
+
+    def __init__(self, scene):
+        factor = {"gravity": 0.0, "gravity of 102 %": 1.02}.get(self.defect, 1.0)
+        super().__init__(scene.with_(gravity=tuple(factor * g for g in scene.gravity)))
+        if self.defect == "inertia of 101 %":
+            self.inertia[-1] *= 1.01
+
+    def loads(self, state):
+        force, moment = super().loads(state)
+        if self.defect == "moment":
+            for load in self.scene.load:
+                if load.type == "moment":
+                    moment[self.scene.body_index(load.body)] -= 2 * np.array(load.moment)
+        if self.defect == "gyroscopic":
+            for b in range(self.count):
+                inertia = state.turn[b] @ self.inertia[b] @ state.turn[b].T
+                moment[b] += 2 * np.cross(state.spin[b], inertia @ state.spin[b])
+        return force, moment
+
+    def rows(self, mate, t, state):
+        if self.defect == "gamma":
+            still = state._replace(velocity=0 * state.velocity, spin=0 * state.spin)
+            return super().rows(mate, t, state)[0], super().rows(mate, t, still)[1]
+        if self.defect == "driver" and mate.driver:
+            rows, gamma = super().rows(mate, t, state)
+            return rows, np.append(gamma[:-1], gamma[-1] - 2 * example.driven(mate.driver, t))
+        return super().rows(mate, t, state)
+
+
+def runner_with(defect, monkeypatch):
+    """Return a runner of the example engine with a defect, or with none ("")."""
+    monkeypatch.setattr(example, "Mechanism", type("Mechanism", (Defective,), {"defect": defect}))
+    return InProcess(example.ENGINE, "spatial")
+
+
+@pytest.mark.parametrize(
+    ("defect", "names", "says"),
+    [
+        ("gravity", ("pendulum",), "look at the gravity: gravity left out explains"),
+        ("gyroscopic", ("tumbling body",), "velocity terms: the gyroscopic moments ω × Jω of opposite"),
+        ("gamma", ("spinning loop",), "velocity terms: the velocity part of γ in J a = γ left out"),
+        (
+            "driver",
+            ("driven", "cylindrical driver"),
+            "look at the drivers: the drivers' accelerations in γ of opposite",
+        ),
+        ("gravity of 102 %", ("free_fall", "revolute joint"), "look at the gravity: gravity times 1.02"),
+        (
+            "moment",
+            ("moment load", "pushed body"),
+            "look at the loads: every moment of opposite sign explains 2 of 2",
+        ),
+        (
+            "inertia of 101 %",
+            ("several springs",),
+            "look at the mass matrix: the inertia of body 'body' times 1.01",
+        ),
+    ],
+)
+def test_hint_names_the_term_of_the_equations_that_is_wrong(defect, names, says, monkeypatch):
+    """The engine has the ``defect`` that `Defective` describes. It is said to have failed the check `truth`
+    on the scenes ``names``; the hint has the words ``says``."""
+    runner = runner_with(defect, monkeypatch)
+    found = hint(runner, [Failure(KNOWN[name], "truth") for name in names])
+    assert says in found, found
+
+
+def test_hint_for_an_engine_with_right_accelerations_points_at_its_integration(monkeypatch):
+    """The example engine without a defect ("") is said to have failed the check `truth`."""
+    found = hint(runner_with("", monkeypatch), [Failure(KNOWN["pendulum"], "truth")])
+    assert "begin with the scene 'pendulum', check truth" in found
+    assert "accelerations agree with the judge's, so look at the integration" in found
+
+
+def test_a_conforming_engine_has_no_hint(monkeypatch):
+    """The example engine without a defect ("") passes all checks on a free fall."""
+    conforming = held_against(runner_with("", monkeypatch), [KNOWN["free_fall"]])
+    assert conforming.conforms and conforming.hint == ""
+
+
+def test_result_of_verify_on_a_failing_engine_has_the_hint(monkeypatch):
+    """The engine without gravity fails on a free fall; the hint is in the result and in its record."""
+    failing = held_against(runner_with("gravity", monkeypatch), [KNOWN["free_fall"]])
+    assert "gravity left out explains 1 of 1 scenes" in failing.hint and not failing.conforms
+    assert failing.to_record()["hint"] == failing.hint
+
+
+TERMS = ("tumbling body", "pendulum", "spinning loop", "cylindrical driver", "torsion", "oscillator")
+
+
+@pytest.mark.parametrize("name", [*TERMS, "force load", "turntable"])
+def test_terms_of_the_judge_give_the_accelerations_of_gausss_principle(name):
+    """The terms of a hint are mass matrix, forces and rows. In a later state of the principle's motion their
+    accelerations (m/s², rad/s²) are the motion's to 1e-10 of the largest (3e-13 is measured)."""
+    scene = KNOWN[name].scene
+    motion = gauss_motion(scene, tuple(np.linspace(0.0, 0.2 * scene.duration, 5).tolist()))
+    exact = np.concatenate([motion.acceleration[3], motion.angular_acceleration[3]], axis=-1)
+    found = accelerations(scene, terms_at(scene, motion, 3)).reshape(-1, 6)
+    found[:, 3:] /= scene_length(scene)
+    assert np.abs(found - exact).max() < 1e-10 * np.abs(exact).max(), (found, exact)

@@ -1,0 +1,105 @@
+"""Pinocchio / truths, and the traps that give silently wrong answers."""
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting, engine
+from crosscheck.judge.metrics import violation_series
+from mbref.motions.trajectory import Outcome, Trajectory
+from mbref.scene import Driver, Scene
+from mbref.scenes import SCENES
+from tests.helpers.measured import MARGIN, ROUNDING, completed_error
+from tests.helpers.tree_scenes import driven
+
+pinocchio = pytest.importorskip("pinocchio")
+
+
+def simulate(scene: Scene, duration: float, family: str, **options) -> Trajectory:
+    return engine("pinocchio").run(scene, np.linspace(0, duration, 11), Setting(family, options))
+
+
+@pytest.mark.parametrize(
+    ("name", "duration", "measured"),  # s, error (m, rad)
+    [
+        ("planar_slider_crank", 0.08, 9e-13),
+        ("planar_slider_crank_equal", 0.1, 2.8e-10),
+        ("spatial_slider_crank", 0.02, 2.2e-12),
+        ("spatial_slider_crank_driven", 0.1, 5.1e-13),
+        ("four_bar", 0.1, 6.5e-13),
+        ("five_bar", 0.1, 4.8e-13),
+        ("four_bar_gravity", 0.5, 5.1e-12),
+    ],
+)
+def test_tuned_pinocchio_stays_within_its_measured_error_of_the_truth(name, duration, measured):
+    """The error from the judge's truth is at most ten times the largest measured with the settings of
+    tests/machines.py. Singular positions magnify rounding, most for the equal slider-crank."""
+    scene = SCENES[name]().with_(duration=duration)
+    finest = [s for s in engine("pinocchio").settings(scene) if s.family == "tuned"][-1]
+    run = engine("pinocchio").run(scene, np.linspace(0, duration, 11), finest)
+    assert completed_error(run, scene) < MARGIN * measured
+
+
+@pytest.mark.parametrize("name", ["planar_slider_crank", "four_bar", "five_bar"])
+def test_default_solver_of_pinocchio_diverges_with_redundant_closures(name: str) -> None:
+    """The scenes have redundant rows, on which one iteration of the default solver does not converge; the
+    message names them as the cause."""
+    run = simulate(SCENES[name](), 0.02, "defaults", step=1e-4)
+    assert run.outcome is Outcome.NOT_FINITE, f"{name}: {run.outcome.label}"
+    assert "redundant" in run.message, f"message {run.message!r}"
+
+
+def test_default_and_proximal_solver_agree_with_the_truth_without_redundancy() -> None:
+    """At a step of 4e-6 s the errors of both from the judge's truth are at most ten times the measured 7e-11
+    m or rad."""
+    scene = SCENES["spatial_slider_crank"]()
+    runs = [simulate(scene, 0.02, family, step=4e-6) for family in ("defaults", "proximal")]
+    errors = [completed_error(run, scene) for run in runs]
+    assert max(errors) < MARGIN * 7e-11, f"errors {errors} of the default and the iterated solver"
+
+
+def test_baumgarte_removes_most_of_the_drift_of_rk4() -> None:
+    """Errors from the judge's truth over 0.2 s, at steps of 0.15 ms. With feedback ("baumgarte") less than
+    0.3 of the error without it ("proximal") is left."""
+    scene = SCENES["planar_slider_crank"]()
+    errors = {
+        f: completed_error(simulate(scene, 0.2, f, step=1.5e-4), scene) for f in ("proximal", "baumgarte")
+    }
+    assert errors["baumgarte"] < 0.3 * errors["proximal"], f"errors {errors}"
+
+
+def test_projection_keeps_the_branch_of_the_driven_four_bar() -> None:
+    """The crank turns at 124.8 rad/s from θ = π/2, and the rhombus is flat at θ = 0 and -π. DOP853 with
+    projection ("tuned") follows the closed form to 0.1 s, to 1e-13 m or rad. Without it, the run passes the
+    second flat position and ends before 0.1 s, not finite."""
+    scene, second = SCENES["four_bar"](), 1.5 * np.pi / 124.8  # s
+    options = {"rtol": 1e-8, "min_step": 2e-4}
+    plain, projected = (simulate(scene, 0.1, family, **options) for family in ("dop853", "tuned"))
+    assert completed_error(projected, scene) < MARGIN * ROUNDING
+    assert plain.outcome is Outcome.NOT_FINITE and plain.t_end > second, plain.message
+
+
+def test_pinocchio_follows_a_driver_exactly_at_a_loose_tolerance() -> None:
+    """The sled's way is 0.5 t + 0.05 sin 7 t (m), to 1e-14 m at a tolerance of 1e-3: drivers prescribe
+    coordinates of the tree and are not integrated."""
+    scene = driven()
+    run = engine("pinocchio").run(
+        scene, np.linspace(0, 0.4, 5), Setting("tuned", {"rtol": 1e-3, "min_step": 1e-3})
+    )
+    sled = [body.name for body in scene.body].index("sled")
+    axis = np.array([0.3, 1.0, 0.0]) / np.hypot(0.3, 1.0)
+    moved = -(run.position[:, sled] - run.position[0, sled]) @ axis  # the ground is the second body
+    expected = 0.5 * run.times + 0.05 * np.sin(7 * run.times)
+    assert abs(moved - expected).max() < ROUNDING
+
+
+def test_driver_beyond_the_slider_s_reach_ends_the_run_with_its_samples() -> None:
+    """A slider is driven outward at 0.5 m/s. Crank and rod of 0.304 m and 0.4048 m are straight, and the
+    slider is at the end of its reach, 0.0473 s later; the run ends within a shortest step (1e-4 s) of
+    this, with its samples at 0, 0.01, … 0.04 s, where joints are closed to rounding."""
+    base, shortest = SCENES["planar_slider_crank_gravity"](), 1e-4
+    still = [body.model_copy(update={"angular_velocity": None}) for body in base.body]
+    scene = base.with_(body=still, driver=(Driver(joint="D", polynomial=(0.0, 0.5)),))
+    end = (0.304 + 0.4048 - base.body[2].position[0]) / 0.5
+    run = simulate(scene, 0.1, "tuned", rtol=1e-8, min_step=shortest)
+    assert run.outcome is Outcome.NOT_CONVERGED and abs(run.t_end - end) < shortest, run.message
+    assert len(run.times) == 5 and violation_series(scene, run).max() < 1e-12

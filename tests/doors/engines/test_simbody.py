@@ -1,0 +1,99 @@
+"""Simbody / truths, Pinocchio, prescribed motion, and what OpenSim cannot."""
+
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Owner, Setting, engine
+from crosscheck.judge.constraints import closure, joint_coordinates
+from mbref.motions.trajectory import Outcome
+from mbref.scene import Driver, Scene, Sine
+from mbref.scenes import SCENES
+from tests.helpers.measured import MARGIN, ROUNDING, completed_error
+from tests.helpers.tree_scenes import BODIES, every_joint
+
+if find_spec("opensim") is None:
+    pytest.skip("the optional engine Simbody needs opensim", allow_module_level=True)
+
+FAMILIES = ("merson", "feldberg", "cpodes")
+
+
+def simulate(scene, duration, accuracy, family="merson", samples=6):
+    setting = Setting(family, {"accuracy": accuracy})
+    return engine("simbody").run(scene, np.linspace(0, duration, samples), setting)
+
+
+@pytest.mark.parametrize(
+    ("name", "duration", "measured"),  # s, error (m, rad)
+    [
+        ("planar_slider_crank_gravity", 1.0, 6.9e-8),
+        ("spatial_slider_crank", 0.02, 1.1e-8),
+        ("spatial_slider_crank_driven", 0.1, 3.3e-9),
+        ("spatial_slider_crank_gravity", 0.5, 4.5e-8),
+        ("four_bar", 0.012, ROUNDING),
+        ("five_bar", 0.012, ROUNDING),
+        ("four_bar_gravity", 0.15, 9.2e-11),
+        ("planar_slider_crank_equal", 0.06, 5.6e-10),  # singular at 0.0612 s
+    ],
+)
+def test_simbody_stays_within_its_measured_error_of_the_truth(name, duration, measured) -> None:
+    """The error from the judge's truth at an accuracy of 1e-9 is at most ten times the measured one."""
+    scene = SCENES[name]()
+    run = simulate(scene, duration, 1e-9)
+    assert completed_error(run, scene) < MARGIN * measured
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_accuracy_of_a_hundredth_reduces_simbody_s_error_fivefold(family: str) -> None:
+    """Errors from the judge's truth at accuracies of 1e-4, 1e-6 and 1e-8; an accuracy that had no effect
+    would leave the error, and one to which the error is proportional would reduce it a hundredfold."""
+    scene = SCENES["spatial_slider_crank"]()
+    errors = [
+        completed_error(simulate(scene, 0.02, accuracy, family), scene) for accuracy in (1e-4, 1e-6, 1e-8)
+    ]
+    assert errors[1] < errors[0] / 5 and errors[2] < errors[1] / 5, f"{family}: errors {errors}"
+
+
+def prescribed(*drivers: Driver) -> Scene:
+    still = tuple(b.model_copy(update={"angular_velocity": None}) for b in BODIES)
+    return every_joint(name="prescribed", body=still, driver=drivers)
+
+
+def test_simbody_follows_polynomial_and_sine_drivers() -> None:
+    """Drivers prescribe t - 2 t² + 3 t³ (rad) of a cylinder and 0.05 (sin(7 t + 0.4) - sin 0.4) (m) of a
+    slide, which are met to ten times the measured 1.6e-13. Accelerations are Pinocchio's to ten times the
+    measured 8.1e-9 m/s²."""
+    pytest.importorskip("pinocchio")
+    wave = Sine(amplitude=0.05, frequency=7.0, phase=0.4)
+    slide = Driver(joint="tra", polynomial=(-0.05 * np.sin(0.4),), sine=wave)
+    scene = prescribed(Driver(joint="cyl", polynomial=(0.0, 1.0, -2.0, 3.0)), slide)
+    run = simulate(scene, 0.4, 1e-10)
+    assert run.outcome is Outcome.COMPLETED, run.message
+    moved = joint_coordinates(scene, run.times, run.position, run.orientation, run.angular_velocity)
+    t = run.times
+    off = (
+        abs(moved["cyl"][:, 0] - (t - 2 * t**2 + 3 * t**3)).max(),
+        abs(moved["tra"][:, 1] - 0.05 * (np.sin(7 * t + 0.4) - np.sin(0.4))).max(),
+    )
+    assert max(off) < MARGIN * 1.6e-13, f"off by {off} rad, m"
+    other = engine("pinocchio").run(scene, t, Setting("tuned", {"rtol": 1e-11, "min_step": 1e-4}))
+    assert abs(run.acceleration - other.acceleration).max() < MARGIN * 8.1e-9
+
+
+def test_simbody_keeps_joints_closed_at_a_loose_accuracy() -> None:
+    """At an accuracy of 1e-6 the judge's joint residuals are at most ten times the measured 7.4e-8 m or
+    rad."""
+    scene = every_joint()
+    run = simulate(scene, scene.duration, 1e-6)
+    assert run.outcome is Outcome.COMPLETED, run.message
+    gap = max(abs(rows).max() for rows in closure(scene, run.times, run.position, run.orientation).values())
+    assert gap < MARGIN * 7.4e-8, f"joints are open by {gap:.1e} m, rad"
+
+
+def test_simbody_refuses_a_driver_by_polynomial_and_sine_at_once() -> None:
+    """OpenSim's functions are one or the other; the refusal names the joint and the engine as the owner."""
+    sine = Sine(amplitude=0.1, frequency=3.0)
+    scene = prescribed(Driver(joint="cyl", polynomial=(0.0, 1.0), sine=sine))
+    refusal = engine("simbody").cannot(scene)
+    assert refusal is not None and refusal.owner is Owner.ENGINE and "cyl" in refusal.reason, refusal
