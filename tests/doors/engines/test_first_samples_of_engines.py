@@ -59,7 +59,8 @@ ENDS = ((0.3, 1.4, 0.1), (-0.7, 0.3, 0.2))  # m, of the spring between wheel and
 
 
 def loaded() -> Scene:
-    """Return a scene with every load of a joint; factors of two loads are not 1 at t = 0."""
+    """Return a scene with every load of a joint, and two springs along two coordinates each; factors of two
+    loads are not 1 at t = 0."""
     bodies = (
         body("arm", (0.5, 0.1, 0.0), (0.1, 0.2, 0.3), 1.3, angular_velocity=(0.0, 0.0, 2.0)),
         body("sled", (0.0, 1.0, 0.3), (0.4, -0.2, 0.1), 0.8, velocity=(0.3, 0.4, 0.0)),
@@ -75,7 +76,9 @@ def loaded() -> Scene:
     loads = (
         TorsionSpring(joint="A", stiffness=4.0, damping=0.3, natural_angle=0.4),
         JointTorque(joint="D", torque=0.7, factor={"polynomial": (1.5, 2.0)}),
+        TorsionSpring(joint="A", stiffness=2.5, damping=0.1, natural_angle=-0.7),
         SlideSpring(joint="D", stiffness=40.0, damping=0.8, natural_displacement=-0.1),
+        SlideSpring(joint="D", stiffness=15.0, damping=0.2, natural_displacement=0.3),
         JointForce(joint="C", force=-5.0, factor={"sine": SINE}),
         Spring(bodies=("wheel", "puck"), points=ENDS, stiffness=30.0, damping=0.5, natural_length=1.0),
     )

@@ -12,7 +12,7 @@ from crosscheck.judge.driver_forces import driver_forces
 from crosscheck.judge.energy import energy_series, kinetic_energy
 from crosscheck.judge.gauss_motion import accelerations, power
 from crosscheck.judge.joint_loads import turning_loads
-from crosscheck.judge.reaction_balance import with_exact_reactions
+from crosscheck.judge.reaction_balance import idle, with_exact_reactions
 from crosscheck.judge.time_functions import value
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
@@ -126,6 +126,15 @@ def test_reactions_by_the_judge_obey_newtons_and_eulers_equations_of_every_body(
     remains is relative to the largest force or moment; accelerations are exact to about 1e-10."""
     scene, run = at_one_moment(name)
     assert max(unbalanced(scene, with_exact_reactions(scene, run))) <= 1e-9
+
+
+@each(lambda scene: bool(scene.joint))
+def test_reactions_by_the_judge_have_no_part_along_a_motion_that_their_joint_allows(name):
+    """Forces of loads, drivers and rotors along a coordinate are no reactions; forces of couplings are. The
+    part along a motion is relative to the largest force."""
+    scene, run = at_one_moment(name)
+    found = with_exact_reactions(scene, run)
+    assert idle(scene, found, run) <= 1e-11
 
 
 def keeps_energy(scene: Scene) -> bool:
