@@ -200,13 +200,14 @@ def test_bodies_are_told_apart_by_the_case_of_letters_under_any_lines(above: str
 
 
 def test_rows_after_the_end_of_the_reference_are_not_right(tmp_path: Path, capsys) -> None:
-    """The pendulum starts at rest, so that its angle is below 1e-4 rad in the first 2 ms; 0.3 CPU s reach
-    about 1 s of 1000 s. The invented last row makes the exit status 1, though the rows before are right."""
+    """The pendulum starts at rest, so that its angle is below 1e-4 rad in the first 2 ms. One CPU s reaches
+    some of its 1000 s, also on slow processors. The invented last row makes the exit status 1, though rows
+    before are right."""
     double_pendulum().with_(duration=1000.0).save(tmp_path / "scene.toml")
     path = tmp_path / "run.csv"
     rows = "time,A.angle\n0,0.000000\n0.001,0.000000\n0.002,0.000000\n1000,7.000000\n"
     path.write_text(rows, encoding="utf-8")
-    limits = ["--reference-time", "0.3", "--tolerance", "1e-4"]
+    limits = ["--reference-time", "1", "--tolerance", "1e-4"]
     assert main(["judge", str(tmp_path / "scene.toml"), str(path), *limits]) == 1
     shown = " ".join(capsys.readouterr().out.split())
     assert "right, rounded to 7 digits, to 0.002 s" in shown and "later rows are not judged" in shown
