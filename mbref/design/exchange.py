@@ -67,7 +67,7 @@ def exchanges(scene: Scene | str | Path, most: int = 6) -> list[Exchange]:
     ends, number = np.cumsum([len(r) for r in rows.values()])[:-1], null.shape[1]
     dependences = dict(zip(rows, np.split(null, ends), strict=True))
     part = {name: np.linalg.norm(of_joint, axis=1) for name, of_joint in dependences.items()}
-    involved = [joint.name for joint in at_pose.scene.joint if part[joint.name].max() > PART]
+    involved = [j.name for j in at_pose.scene.joint if j.name in part and part[j.name].max() > PART]
     choices = _weaker_types(scene, at_pose, rows, {name: dependences[name] for name in involved})
     kept = {name: {k: w for k, w in kinds.items() if k != REMOVED} for name, kinds in choices.items()}
     found = _smallest_sets(kept, number, most)

@@ -17,7 +17,7 @@ from crosscheck.engines.shared.spanning_tree import Link, Tree, spanning_tree
 from crosscheck.refusals import MOST_COUPLED
 from mbref import rotations
 from mbref.formats import Exported
-from mbref.scene import Force, JointForce, JointTorque, Moment, Scene, SceneError
+from mbref.scene import Force, JointForce, JointLoad, JointTorque, Moment, Scene, SceneError
 
 CONSTANT = (Moment, Force)  # loads that MJCF cannot describe
 KEYFRAME = "loads"  # with the control values of motors that stand for forces and torques of joints
@@ -32,19 +32,22 @@ def write(scene: Scene) -> Exported:
         raise SceneError([f"body {links[0]!r}: is a massless link; MuJoCo reads no moving body of mass 0"])
     kept = [load for load in scene.load if not (isinstance(load, CONSTANT) or load.over_time)]
     pairs = [each for each in scene.coupling if len(each.joints) == MOST_COUPLED and each.powers <= POWERS]
-    bare = scene.with_(driver=(), load=kept, coupling=pairs)
+    acting = {load.joint for load in kept if isinstance(load, JointLoad)}
+    acting |= {name for coupling in pairs for name in coupling.joints}
+    joints = [joint for joint in scene.joint if joint.facts.rows or joint.name in acting]
+    bare = scene.with_(joint=joints, driver=(), load=kept, coupling=pairs)
     tree = spanning_tree(bare)
     spec, pushed = description(bare, tree)
     spec.modelname = scene.name
-    names = _names(scene, tree)
+    names = _names(bare, tree)
     for k, link in enumerate(tree.links):
         body = spec.body(f"link {k}")
         _true_inertia(body, link)
         body.name = names[k]
     for k, closure in enumerate(tree.closures):
         if closure.kind == "point":  # a weld joins two parts of a body
-            spec.equality(f"closure {k}").name = scene.joint[closure.joint].name
-    new = _name_joints(spec, scene, tree)
+            spec.equality(f"closure {k}").name = bare.joint[closure.joint].name
+    new = _name_joints(spec, bare, tree)
     motors = [(new[name], amount) for name, amount, _ in pushed]
     return Exported(_text(spec, new, motors), tuple(_left_out(scene)))
 

@@ -37,7 +37,7 @@ def own_step(name: str, step: float) -> Setting:
 
 @functools.cache
 def scenes() -> dict[str, Scene]:
-    probes = moving_probes()
+    probes = {n: s for n, s in moving_probes().items() if all(j.facts.rows for j in s.joint)}
     rings = {f"ring {kind}": ring(kind) for kind in ("revolute", "cylindrical", "universal", "spherical")}
     return {"every joint": every_joint(), "driven": driven(), **rings, **probes}
 

@@ -219,7 +219,9 @@ def test_motors_that_cannot_cause_the_motion_are_refused(motors, changes, senten
 
 
 def test_command_writes_torques_of_motors_and_says_which_share_the_work(tmp_path, capsys):
-    """Columns of a CSV file have the numbers of Python; JSON, which lacks them, is refused."""
+    """Columns of a CSV file have the numbers of Python; JSON, which lacks them, is refused. Hinge A can end
+    the redundancy, in which drivers take no part."""
+    assert {"A": "inline"} in mbref.exchanges(arm())
     arm().save(tmp_path / "arm.toml")
     run = ["run", str(tmp_path / "arm.toml"), "--samples", "7", "--estimate", "no", "--motors"]
     out = str(tmp_path / "arm.csv")
