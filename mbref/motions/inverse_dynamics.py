@@ -87,7 +87,7 @@ def inverse_dynamics(motion: Motion, motors: Sequence[str]) -> Motion:
         )
     samples, length = _samples(scene, motion, motors, forces)
     freedoms = min((each.freedoms for each in samples), default=0)
-    rank = max((each.rank for each in samples), default=0)
+    rank = max((each.rank for each in samples if each.freedoms == freedoms), default=0)
     regular = np.array([each.freedoms == freedoms and each.rank == rank for each in samples], dtype=bool)
     _refuse_missing(scene, motion, motors, [s if r else None for s, r in zip(samples, regular, strict=True)])
     found = {}
