@@ -13,6 +13,7 @@ from mbref.simulation import VERSION
 if TYPE_CHECKING:
     from mbref.design.along_motion import AlongMotion, along_motion
     from mbref.design.derivatives.at_rest import equilibrium_sensitivities
+    from mbref.design.derivatives.at_state import StateDerivatives, state_derivatives
     from mbref.design.derivatives.eigenvalues import EigenvalueSensitivities, eigenvalue_sensitivities
     from mbref.design.derivatives.fit import FitResult, fit
     from mbref.design.derivatives.result import Sensitivities
@@ -45,6 +46,7 @@ __version__ = VERSION
 
 _PUBLIC = {  # module → its public names
     "design.derivatives.at_rest": ("equilibrium_sensitivities",),
+    "design.derivatives.at_state": ("StateDerivatives", "state_derivatives"),
     "design.derivatives.eigenvalues": ("EigenvalueSensitivities", "eigenvalue_sensitivities"),
     "design.derivatives.fit": ("FitResult", "fit"),
     "design.derivatives.result": ("Sensitivities",),
@@ -95,6 +97,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "Sensitivities",
+    "StateDerivatives",
     "Trajectory",
     "Variation",
     "along_motion",
@@ -115,6 +118,7 @@ __all__ = [
     "plot",
     "sensitivities",
     "simulate",
+    "state_derivatives",
     "still",
     "sweep",
     "terms",

@@ -51,7 +51,7 @@ def terms(scene: Scene | str | Path, t: float = 0.0, state: GivenState | None = 
     model = Model(assembled(scene))
     frames = BodyFrames(model)
     if state is not None:
-        q, v = _checked(state, model)
+        q, v = checked_state(state, model)
         q, v = frames.principal_coordinates(q), frames.principal(v)
     elif at == 0.0:
         start = consistent_start(model)
@@ -63,7 +63,7 @@ def terms(scene: Scene | str | Path, t: float = 0.0, state: GivenState | None = 
     return found
 
 
-def _checked(state: GivenState, model: Model) -> tuple[np.ndarray, np.ndarray]:
+def checked_state(state: GivenState, model: Model) -> tuple[np.ndarray, np.ndarray]:
     """Return the arrays of a state; raises InputError for other shapes, or quaternions of no length."""
     sizes = (7 * model.nb,), (6 * model.nb,)
     try:

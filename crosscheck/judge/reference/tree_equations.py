@@ -86,7 +86,7 @@ class TreeEquations:
         """Return the sizes of the joint rates and of the rows of closures and drivers, row weights near one,
         and the displacements of closures."""
         rng, closing = np.random.default_rng(seed), self.closures.sizes(self.length)
-        self._rate_sizes = np.where(self.tree.turning, 1.0, self.length)
+        self.rate_sizes = np.where(self.tree.turning, 1.0, self.length)
         sizes = self._coordinate_sizes()
         coupled = (np.abs(doubles(self.laws[:, 0])) * sizes[self.coupled]).max(axis=0)
         self._row_sizes = np.concatenate([closing, sizes[self.driven], coupled])
@@ -97,7 +97,7 @@ class TreeEquations:
         """Return the size of each joint coordinate and twist: the scene's length for displacements, one for
         angles."""
         away = np.where(self.measured.sizes, self.length, 1.0)
-        return np.concatenate([self._rate_sizes[: self.tree.scalars], away])
+        return np.concatenate([self.rate_sizes[: self.tree.scalars], away])
 
     def light_rates(self, y: np.ndarray) -> np.ndarray:
         """Return the rates (K, light) of scalars and quaternions; a quaternion's rate is half spin times
@@ -195,7 +195,7 @@ class TreeEquations:
         """Return states (K, n) after one Newton step towards closed loops and consistent rates."""
         at = self.at(t, y)
         step, _ = self._solve(at, 0 * at.rate, -1 * at.rows.value)
-        better = self._moved(y, step, at.coordinates.jacobian)
+        better = self.displaced(y, step, at.coordinates.jacobian)
         better[:, self.ends[2] :] = at.rate + self._solve(at, 0 * at.rate, -1 * at.speed)[0]
         return better
 
@@ -218,7 +218,7 @@ class TreeEquations:
         scalar, ball, angle, rate = np.split(y, self.ends[:-1], axis=1)
         return scalar, ball.reshape(len(y), len(self.tree.balls), 4), angle, rate
 
-    def _moved(self, y: np.ndarray, step: np.ndarray, coordinates: np.ndarray) -> np.ndarray:
+    def displaced(self, y: np.ndarray, step: np.ndarray, coordinates: np.ndarray) -> np.ndarray:
         """Return the states after a small displacement (K, nv) of the joint coordinates."""
         y = y.copy()
         y[:, self.ends[2] :] = step
@@ -240,7 +240,7 @@ class TreeEquations:
         rows = doubles(at.rows.jacobian[0])
         if self.kept is None:
             self.rank = self._rank(rows)
-        rows = rows * self._rate_sizes / self._row_sizes[:, None]
+        rows = rows * self.rate_sizes / self._row_sizes[:, None]
         _, order = qr(rows.T * self._weights, mode="r", pivoting=True)
         best = np.sort(order[: self.rank])
         if self.kept is None or _least(rows[self.kept]) < WORSE * _least(rows[best]):

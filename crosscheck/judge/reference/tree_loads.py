@@ -49,6 +49,21 @@ class Loads:
         """Return the mass matrix (K, nv, nv)."""
         return self._mass_matrix(placed, coordinates, self._world_inertia(placed))
 
+    def momentum(
+        self, placed: Placed, coordinates: Rows, twists: np.ndarray, rates: np.ndarray
+    ) -> np.ndarray:
+        """Return the generalised momenta (K, nv) of any twists (6 nb,) of the bodies, and rates (g,) of the
+        coordinates with armatures."""
+        parts = twists.reshape(-1, 6)
+        turning = apply(self._world_inertia(placed), parts[:, 3:])
+        sliding = self.mass * parts[:, :3] + 0 * turning
+        wrench = self._with_ground(np.concatenate([sliding, turning], axis=-1))
+        found = self._project(placed, wrench)
+        if not len(self.geared):
+            return found
+        rows = np.swapaxes(coordinates.jacobian[:, self.geared], 1, 2)
+        return found + apply(rows, self.armature * rates)
+
     def terms(
         self, placed: Placed, coordinates: Rows, rate: np.ndarray, t: np.ndarray, since: float
     ) -> tuple[np.ndarray, np.ndarray]:

@@ -148,7 +148,7 @@ class Balance:
         """Return the states (K, n) after displacements (K, nv) of the joint coordinates; rates stay."""
         states = np.repeat(y[None], len(step), axis=0)
         jacobian = np.repeat(self.at(y[None]).coordinates.jacobian, len(step), axis=0)
-        found = self.equations._moved(states, step, jacobian)
+        found = self.equations.displaced(states, step, jacobian)
         found[:, self.equations.ends[2] :] = states[:, self.equations.ends[2] :]
         return found
 

@@ -69,7 +69,7 @@ class Followed:
         or if panels stay too coarse.
         """
         edges = before.edges if before else np.zeros(1)
-        motion, states = _run(scene, method, limits, _all_times(edges, rule, samples))
+        motion, states = states_of_run(scene, method, limits, _all_times(edges, rule, samples))
         if not states.times.size:
             raise InputError(f"{scene.name}: {motion.message}")
         undecided = min((crossing.time for crossing in motion.crossings or ()), default=np.inf)
@@ -83,7 +83,7 @@ class Followed:
         while len(edges) <= MOST_PANELS:
             times = _all_times(edges, rule, reached)
             if not np.isin(times, states.times).all():
-                _, states = _run(scene, method, limits, times)
+                _, states = states_of_run(scene, method, limits, times)
             inner = _at(states, _points(edges, rule))
             if before and edges is before.edges:
                 partitions, by_panel = before.partitions, before.by_panel
@@ -98,7 +98,7 @@ class Followed:
             t = edges[int(np.argmax(rough))]
             raise InputError(f"{scene.name}: the motion near t = {t:.6g} s changes too fast for derivatives")
         if samples[0] > 0.0 and not before:
-            motion = _run(scene, method, limits, samples)[0]
+            motion = states_of_run(scene, method, limits, samples)[0]
         first, ends, own = _at(states, np.zeros(1)), _at(states, edges[1:]), _at(states, reached)
         if len(edges) > 1:
             by_sample = by_panel[places_in(edges, reached)]
@@ -129,7 +129,7 @@ def _at(states: States, times: np.ndarray) -> States:
     return states.at(np.searchsorted(states.times, times))
 
 
-def _run(scene: Scene, method: Method, limits: Limits, times: np.ndarray) -> tuple[Motion, States]:
+def states_of_run(scene: Scene, method: Method, limits: Limits, times: np.ndarray) -> tuple[Motion, States]:
     """Return a run of a scene, and its states at the times that it reached."""
     run = checked_run(scene, method, times, limits)
     motion = finish_run(run)

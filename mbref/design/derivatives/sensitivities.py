@@ -109,13 +109,14 @@ def motion_and_derivatives(
     return run.motion, found.outputs, found.values
 
 
-def _refuse(scene: Scene, of: Sequence[str] | None, to: Sequence[str]) -> None:
+def _refuse(scene: Scene, of: Sequence[str] | None, to: Sequence[str] | None) -> None:
     """Raise InputError for scenes without derivatives, and for an empty list of outputs or numbers."""
     if is_intermittent(scene):
         raise InputError(f"{scene.name}: intervals (`active`) and end stops have no derivatives here")
     if of is not None:
         _refuse_no_list("of", of)
-    refuse_repeats(scene, "to", to)
+    if to is not None:
+        refuse_repeats(scene, "to", to)
 
 
 def _refuse_no_list(name: str, given: Sequence[str]) -> None:
@@ -149,21 +150,21 @@ class DerivativeRequest:
         self,
         scene: Scene,
         of: Sequence[str] | None,
-        labels: Sequence[str],
+        labels: Sequence[str] | None,
         times: Sequence[float] | np.ndarray | None,
     ):
         self.samples = checked_times(np.linspace(0.0, scene.duration, SAMPLES) if times is None else times)
         if self.samples[-1] > scene.duration:
             scene = scene.with_(duration=float(self.samples[-1]))
         _refuse(scene, of, labels)
-        self.scene, self.of, self.labels = scene, of or (), tuple(labels)
+        self.scene, self.of, self.labels = scene, of or (), tuple(labels or ())
         self.model = Model(assembled(scene))
         if self.model.m > MOST_ROWS:
             count = f"{scene.name}: {self.model.m} constraint rows"
             raise InputError(f"{count}; derivatives are for up to {MOST_ROWS}")
         self.method = Method.parse(default_method(scene))
         self.motion: Motion | None = None  # of the first solution
-        self.units = [unit_of_number(scene, label) for label in labels]
+        self.units = [unit_of_number(scene, label) for label in self.labels]
 
     @cached_property
     def numbers(self) -> list[SceneNumber]:
