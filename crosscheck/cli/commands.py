@@ -163,6 +163,12 @@ def _files(arguments: argparse.Namespace) -> int:
     return files(arguments)
 
 
+def _derivatives(arguments: argparse.Namespace) -> int:
+    from crosscheck.cli.derivatives import derivatives
+
+    return derivatives(arguments)
+
+
 def _versions(arguments: argparse.Namespace) -> int:
     from crosscheck.cli.versions import versions
 
@@ -183,6 +189,7 @@ COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "invariants": invariants,
     "alternatives": alternatives,
     "modes": modes,
+    "derivatives": _derivatives,
     "report": _report,
     "paper": _paper,
     "diff": _diff,

@@ -51,6 +51,33 @@ def add_alternatives(commands: Commands) -> None:
     )
 
 
+def add_derivatives(commands: Commands) -> None:
+    """Add the parser of `crosscheck derivatives`."""
+    about = (
+        "compare derivatives of accelerations on closed loops, by the functions that engines have for them, "
+        "with the judge's derivatives in 30 digits: along the motions that the joints allow, by velocities, "
+        "and by forces on the bodies. The derivative along a motion keeps loops closed, and changes "
+        "velocities by the least amount that the joints require, so that it is the same in all coordinates. "
+        "Each function is also compared with differences of the engine's own accelerations, at the state and "
+        "with open loops: an engine that differentiates its own step or soft constraints can be right there, "
+        "and wrong about the exact motion. An error up to 1e-6 of the largest derivative is right, up to "
+        "1e-2 rough. Loads are left out, and drivers refused. A sentence says whether an error depends on "
+        "open loops, on velocities, or on neither. Exit status: 1 if a derivative is wrong"
+    )
+    example = (
+        "crosscheck derivatives pinocchio\n  crosscheck derivatives my.toml --engine mujoco --json\n"
+        "  crosscheck derivatives my_module:ENGINE"
+    )
+    parser = add_command(commands, "derivatives", about, example)
+    about = (
+        "engines, and scenes: built-in names, .toml, MJCF, URDF or SDF files; default: all engines that have "
+        "such functions, and mechanisms with point closures, welds and redundant rows"
+    )
+    parser.add_argument("what", nargs="*", metavar="ENGINE|SCENE", help=about)
+    add_engines(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON document and nothing else")
+
+
 def add_files(commands: Commands) -> None:
     """Add the parser of `crosscheck files`."""
     about = (

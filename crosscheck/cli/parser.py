@@ -8,6 +8,7 @@ from textwrap import fill
 
 from crosscheck.cli.commands_of_engines import (
     add_alternatives,
+    add_derivatives,
     add_diagnose,
     add_diff,
     add_files,
@@ -52,8 +53,9 @@ EXIT = (
     "`run` gives 1 where a run did not complete; `compare` and `report` give 0 although engines fail, since "
     "failures of engines are results, and `compare` 1 where two engines simulate different "
     "mechanisms. `tune` gives 1 where no setting reaches the error, `verify` where a check fails "
-    "or no scene was run, `diagnose` where a known defect shows, `files` where a reader builds another "
-    "machine, `diff` and `versions` where something differs by more than noise."
+    "or no scene was run, `diagnose` where a known defect shows, `derivatives` where one is wrong, "
+    "`files` where a reader builds another machine, `diff` and `versions` where something differs by more "
+    "than noise."
 )
 
 
@@ -82,6 +84,7 @@ def parser() -> argparse.ArgumentParser:
         _add_invariants,
         add_alternatives,
         _add_modes,
+        add_derivatives,
         _add_report,
         _add_paper,
         add_diff,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
+from crosscheck.differentiating import Differentiating, TangentDerivatives
 from crosscheck.engine import Alternatives, Cannot, Engine, Owner, Setting, Supports
 from crosscheck.judge.tolerances import ROUNDING
 from crosscheck.refusals import FACTOR, TABLE
@@ -62,17 +63,19 @@ ALTERNATIVES = (
         1e-5,
     ),
 )
+DIFFERENTIATES_BY = {"state_derivatives": "the linearised equations Φ_q δa = δγ, M δa + Φ_qᵀ δλ = δg"}
 SECOND_RUN = "taylor"  # the method of the second runs by which errors are estimated
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-10, 1e-11)
 
 
-class Mbref(Engine):
+class Mbref(Differentiating, Engine):
     """The reference implementation; ``settings`` has several relative tolerances for each method."""
 
     name = "mbref"
     with_default = ("rtol",)
     package = "mbref"
     families, options, alternatives = FAMILIES, OPTIONS, ALTERNATIVES
+    differentiates_by = DIFFERENTIATES_BY
     supports = Supports(
         joints=tuple(JOINT_TYPES),
         drivers=get_args(Coordinate),
@@ -92,6 +95,14 @@ class Mbref(Engine):
         from mbref import __version__
 
         return __version__
+
+    def own_derivatives(
+        self, scene: Scene, function: str, away: np.ndarray | None = None
+    ) -> TangentDerivatives:
+        from mbref.design.derivatives.at_state import state_derivatives
+
+        found = state_derivatives(scene)
+        return TangentDerivatives(found.basis, found.by_position, found.by_velocity, found.by_force)
 
     def refuses(self, scene: Scene) -> Cannot | None:
         from mbref.equations.counts import undriven_freedoms

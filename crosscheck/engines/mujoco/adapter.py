@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Setting
-from crosscheck.engines.mujoco import compiled_run, linearised, original, stops
+from crosscheck.engines.mujoco import compiled_run, derivatives, linearised, original, stops
 from crosscheck.engines.mujoco.families import (
     CHOSEN,
     COMPILED,
@@ -46,7 +46,7 @@ DEFAULTS = (
 SCOUT_SAMPLES = 41  # number of samples of the coarse run that measures the scene's fastest rate
 
 
-class MuJoCo(linearised.Linearised, Engine):
+class MuJoCo(linearised.Linearised, derivatives.Differentiated, Engine):
     """MuJoCo 4."""
 
     name = "mujoco"

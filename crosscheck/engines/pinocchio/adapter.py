@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Owner, Setting
-from crosscheck.engines.pinocchio import compiled_run
+from crosscheck.engines.pinocchio import compiled_run, derivatives
 from crosscheck.engines.pinocchio.families import (
     ALTERNATIVES,
     CHOSEN,
@@ -42,7 +42,7 @@ SCOUT_RTOL = 1e-5
 SCOUT_SAMPLES = 41  # number of samples of the coarse run that measures the scene's fastest rate
 
 
-class Pinocchio(Engine):
+class Pinocchio(derivatives.Differentiated, Engine):
     """Pinocchio (PyPI ``pin``)."""
 
     name = "pinocchio"

@@ -1,0 +1,1 @@
+"""Derivatives of accelerations by the functions of engines, against the judge's."""
