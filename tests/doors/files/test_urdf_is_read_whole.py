@@ -84,6 +84,23 @@ def test_elements_that_are_not_read_are_listed_with_their_part(files):
         assert f"left out: <{tag}> of " in out
 
 
+@pytest.mark.parametrize(("count", "ends"), [(6, "joint 'j5': is not"), (8, "joint 'j5' and 2 more: is not")])
+def test_six_parts_with_an_element_that_is_not_read_are_named_and_further_ones_counted(files, count, ends):
+    """Links in a row, whose joints j0, j1, … have the element <springy>."""
+    row = [f'<link name="k{k}">{MASS.format(MOMENTS)}</link>' for k in range(count)]
+    names = ["base", *(f"k{k}" for k in range(count))]
+    row += [hinge(f"j{k}", names[k], names[k + 1], "0.3 0 0", more="<springy/>") for k in range(count)]
+    _, out = files.scene(f'<robot name="r"><link name="base"/>{"".join(row)}</robot>', "r.urdf")
+    listed = ", ".join(f"joint 'j{k}'" for k in range(5))
+    assert f"left out: <springy> of {listed}, {ends} read" in out
+
+
+@pytest.mark.parametrize("value", ["${2 * m}", "$(arg m)"])
+def test_an_expression_of_xacro_is_refused_with_its_element_and_value(files, value):
+    said = files.refusal(robot(*CRANKS).replace('value="0.3"', f'value="{value}"'), "r.urdf")
+    assert f"<mass value='{value}'>: is an expression of xacro" in said
+
+
 def test_a_moment_of_inertia_larger_than_the_two_others_together_is_refused(files):
     """0.5 > 0.1 + 0.2 kg m². The sentence does not name "balanceinertia", an option of MuJoCo alone."""
     text = robot(*CRANKS).replace(MOMENTS, 'ixx="0.1" ixy="0" ixz="0" iyy="0.5" iyz="0" izz="0.2"', 1)
