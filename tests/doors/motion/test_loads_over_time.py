@@ -82,5 +82,5 @@ def test_faulty_function_of_time_is_refused_by_path_and_line(message, tmp_path):
 
 def test_force_along_a_joint_that_does_not_slide_is_refused():
     """The wheel turns on a hinge."""
-    with pytest.raises(SceneError, match="only translational, cylindrical joints can carry a joint_force"):
+    with pytest.raises(SceneError, match="only translational, cylindrical, free joints can carry a joint_f"):
         scenes.wheel().with_(load=[JointForce(joint="J", force=1.0)])
