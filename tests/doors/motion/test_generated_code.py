@@ -66,9 +66,9 @@ def test_generated_code_follows_a_motion_that_turns_back(name):
 
 @pytest.mark.parametrize("name", (*MECHANISMS, "four_bar", "planar_slider_crank_equal", "four_bar_gravity"))
 def test_runs_by_generated_code_and_general_kernels_agree_in_poses_reactions_and_steps(name):
-    """Positions agree to 100 times rounding (m), accelerations and reactions, which singular positions
-    magnify, to 1e-5 of the largest. Numbers of steps may differ by a twentieth, or by one a crossing:
-    rounding decides on the step after it."""
+    """Positions (m) and quaternions agree to 100 times rounding. Accelerations and reactions agree to 1e-5 of
+    the largest value, or of 1 if that is larger, as singular positions magnify rounding. Numbers of steps may
+    differ by a twentieth, or by one for each crossing: rounding decides on the step after a crossing."""
     times = np.linspace(0.0, 0.2, 5)
     generic, own = (
         simulate(SCENES[name](), ORDER_16, times, Limits(rtol=1e-11, code=code))
@@ -76,6 +76,7 @@ def test_runs_by_generated_code_and_general_kernels_agree_in_poses_reactions_and
     )
     assert generic.outcome == own.outcome and len(own.times) == len(times), own.message
     assert np.abs(generic.position - own.position).max() < 100 * ROUNDING
+    assert np.abs(generic.orientation - own.orientation).max() < 100 * ROUNDING
     for mine, theirs in ((own.acceleration, generic.acceleration), *_reactions(own, generic)):
         assert np.abs(mine - theirs).max() <= 1e-5 * max(1.0, np.abs(theirs).max())
     apart = abs(generic.cost.steps - own.cost.steps)
