@@ -80,3 +80,16 @@ def double_pendulum() -> Scene:
             Revolute(name="B", bodies=("upper", "lower"), anchor=(0.6, 0.0, 0.0), axis=(0.0, 0.6, 0.8)),
         ],
     )
+
+
+def turned(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Scene, Table], Table]:
+    """Return the change of all quaternions (k, 4)."""
+
+    def of(scene: Scene, table: Table) -> Table:
+        found = dict(table)
+        for body in scene.body:
+            names = [f"{body.name}.orientation.{a}" for a in "wxyz"]
+            found.update(zip(names, change(np.array([table[n] for n in names]).T).T, strict=True))
+        return found
+
+    return of

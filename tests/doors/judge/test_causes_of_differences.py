@@ -13,7 +13,7 @@ from crosscheck.recorded.changed_scenes import changes
 from mbref import rotations
 from mbref.scene import Scene, TorsionSpring
 from mbref.scenes import find_scene
-from tests.helpers.tables import Table, damped_pendulum, double_pendulum, spinning_rod, switched_motor
+from tests.helpers.tables import Table, damped_pendulum, double_pendulum, spinning_rod, switched_motor, turned
 
 SCENES: dict[str, Callable[[], Scene]] = {
     **{"damped_pendulum": damped_pendulum, "switched_motor": switched_motor, "spinning_rod": spinning_rod},
@@ -38,19 +38,6 @@ def motion(scene: Scene, times: np.ndarray | None = None) -> Table:
 def scaled(factor: float, *ends: str) -> Callable[[Scene, Table], Table]:
     """Return the change of columns with a part of these names by a factor."""
     return lambda _, t: {n: c * (factor if any(e in n for e in ends) else 1.0) for n, c in t.items()}
-
-
-def turned(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Scene, Table], Table]:
-    """Return the change of all quaternions (k, 4)."""
-
-    def of(scene: Scene, table: Table) -> Table:
-        found = dict(table)
-        for body in scene.body:
-            names = [f"{body.name}.orientation.{a}" for a in "wxyz"]
-            found.update(zip(names, change(np.array([table[n] for n in names]).T).T, strict=True))
-        return found
-
-    return of
 
 
 def rotation_vectors(q: np.ndarray) -> np.ndarray:

