@@ -21,7 +21,7 @@ from mbref.scenes import SCENES
 from tests.helpers.joint_strategies import DRIVABLE, one_joint_scenes
 from tests.helpers.measured import MARGIN, ROUNDING
 from tests.helpers.tree_scenes import driven, every_joint, ring
-from tests.helpers.truth_scenes import CLOSED
+from tests.helpers.truth_scenes import ALL, CLOSED
 
 SPACES = 2.1e-14  # measured difference of projections on row spaces, whose entries are at most 1
 ACCELERATIONS = 8e-13  # measured difference, over 1 + the largest acceleration
@@ -166,11 +166,12 @@ def test_jacobian_of_constraint_polynomials_times_velocities_gives_their_rates(n
     assert abs(rates - levels[1]).max() < MARGIN * 2.1e-14
 
 
-@pytest.mark.parametrize("name", ["every_joint", "planar_slider_crank_gravity"])
+@pytest.mark.parametrize("name", ["every_joint", "planar_slider_crank_gravity", "crank_torsion"])
 def test_generalised_forces_of_adapters_equal_mbrefs(name: str) -> None:
     """Gravity, loads and gyroscopic moments (6 nb,) in world axes. Adapters and mbref share no code here;
-    mbref's bodies have principal frames. They differ by rounding, 1e-13 of the largest."""
-    scene = MECHANISMS[name]
+    mbref's bodies have principal frames. They differ by rounding, 1e-13 of the largest. In crank_torsion a
+    torsion spring acts between two bodies that move."""
+    scene = ALL[name] if name in ALL else MECHANISMS[name]
     s = Consistent(scene, 0.0, 3, 0.02)
     forces = Forces(scene)
     angles = np.array([forces.angle(s.frames, k) for k in range(len(forces.twists))])

@@ -99,18 +99,6 @@ def test_exudyns_trapezoidal_rule_has_order_two_and_extrapolation_more_than_five
     assert order > 5, f"extrapolated {order:.3f} from {errors}"
 
 
-def test_exudyn_gives_the_true_accelerations():
-    """Differences from the judge's truth of a slider-crank, relative to the largest acceleration, are at most
-    ten times the measured 2.7e-8."""
-    scene = SCENES["planar_slider_crank_gravity"]()
-    trajectory = run(scene, np.linspace(0, 0.1, 6), "tuned", 1e-4)
-    exact = truth_for(scene).poses(trajectory.times)
-    for key in ("acceleration", "angular_acceleration"):
-        off = np.abs(getattr(trajectory, key) - getattr(exact, key)).max()
-        scale = np.abs(getattr(exact, key)).max()
-        assert off < MARGIN * 2.7e-8 * scale, f"{key} off by {off:.2e} of {scale:.2e}"
-
-
 @pytest.mark.parametrize("kind", [Revolute, Cylindrical])
 @pytest.mark.parametrize("bodies", [("ground", "b"), ("b", "ground")])
 def test_exudyn_swings_a_body_on_a_torsion_spring_beyond_a_turn(kind: type, bodies: tuple[str, str]):
