@@ -9,11 +9,8 @@ from crosscheck.engine import Setting
 from crosscheck.processes import serve
 from crosscheck.study.grid import Case, run_case
 from crosscheck.study.record_view import public
-from mbref.motions.trajectory import Outcome
-from mbref.scene import Scene
 from mbref.scenes import SCENES
 from tests.helpers.fake_engines import FAKES, Fake
-from tests.helpers.parts import hinge, rod
 
 SCENE = SCENES["spatial_slider_crank_gravity"]().with_(duration=0.3)
 TIMES = np.linspace(0.0, 0.3, 7)
@@ -43,16 +40,3 @@ def test_an_engine_without_estimates_has_none_in_its_record():
     assert "error_estimate" not in record
     run = Fake().run(SCENE, TIMES, Setting("a", {"seconds": 0.5}))
     assert Fake().with_error_estimate(run, 1.0) is run
-
-
-def test_the_message_of_an_estimated_run_says_that_its_motion_is_sensitive():
-    """Three rods in a row, released from a horizontal line, move chaotically."""
-    names, pins = ("ground", "a", "b", "c"), [(0.4 * k, 0.0, 0.0) for k in range(4)]
-    bodies = [rod(names[k + 1], pins[k], pins[k + 1]) for k in range(3)]
-    joints = [hinge(f"P{k}", names[k], names[k + 1], pins[k]) for k in range(3)]
-    rods = Scene(name="rods", gravity=(0.0, -9.81, 0.0), duration=8.0, body=bodies, joint=joints)
-    setting = Setting("taylor", {"rtol": 1e-7})
-    run = serve.run_estimated("mbref", rods, np.linspace(0.0, 8.0, 9), setting, 10.0)
-    assert run.outcome is Outcome.COMPLETED
-    assert run.message.startswith("sensitive motion: error about "), run.message
-    assert serve.run_once("mbref", rods, np.linspace(0.0, 8.0, 9), setting).message == ""

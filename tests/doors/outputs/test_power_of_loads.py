@@ -1,7 +1,6 @@
 """Power of loads on an arm of 2 m that turns by 2 t + 1.5 t² rad, and the energy that springs store."""
 
 import numpy as np
-import pytest
 
 from mbref import Motion, Scene, simulate
 from tests.helpers.parts import Z, hinge, slide
@@ -12,7 +11,6 @@ ANGLE = 2.0 * TIMES + 1.5 * TIMES**2
 FACTOR = {"polynomial": [1.0, -0.5]}
 VALUES = 1.0 - 0.5 * TIMES
 CLOSE = 1e-11  # relative error by rounding of the run's steps
-LARGEST = 100.0  # W; powers of the force and the moment are below it
 
 
 def swung(*load) -> Motion:
@@ -21,20 +19,6 @@ def swung(*load) -> Motion:
     driver = [{"joint": "A", "polynomial": [0.0, 2.0, 1.5]}]
     joints = [hinge("A", "ground", "arm", (0.0, 0.0, 0.0), Z)]
     return simulate(Scene(name="arm", body=[body], joint=joints, driver=driver, load=load), times=TIMES)
-
-
-@pytest.mark.parametrize(
-    ("factor", "values"), [({}, 1.0), ({"factor": FACTOR}, VALUES)], ids=["constant", "times 1 - t/2"]
-)
-def test_power_of_a_force_is_force_times_velocity_and_of_a_moment_moment_times_rate(factor, values):
-    """The force (3, -1, 4) N acts on the tip, whose velocity is 2 φ' (-sin φ, cos φ); of the moment, -7 N m
-    about z counts alone."""
-    force = {"type": "force", "body": "arm", "point": [2.0, 0.0, 0.0], "force": [3.0, -1.0, 4.0], **factor}
-    moment = {"type": "moment", "body": "arm", "moment": [5.0, 6.0, -7.0], **factor}
-    motion = swung(force, moment)
-    tip = 2.0 * RATE * np.array([-np.sin(ANGLE), np.cos(ANGLE)])
-    for k, power in enumerate((3.0 * tip[0] - tip[1], -7.0 * RATE)):
-        assert np.allclose(motion.load_at(k).power, values * power, rtol=0.0, atol=CLOSE * LARGEST)
 
 
 def test_springs_store_half_their_stiffness_times_the_square_of_their_stretch():

@@ -2,8 +2,6 @@
 Driver A turns by φ(t) = 0.4 t + 1.5 t² + 0.3 sin 4t rad, or slides by as many m. ANGLE, RATE and SECOND are
 φ, φ' and φ''. A torque is the inertia that the motor sees times φ'', and the power torque times φ'."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
@@ -65,26 +63,6 @@ def test_motor_of_a_wheel_drives_the_wheel_that_meshes_with_it(pair, ratio):
     assert_equal(found.torque, (0.1 + 0.4 + 3.0**2 * (0.2 + 0.7)) * SECOND)
 
 
-def test_motor_drives_all_wheels_of_a_train():
-    """A turn of A gives n = 2 turns of B and n = 1 of C, but for signs: each adds n² (J + I) with J = 0.2, I
-    = 0.3 and J = 0.3, I = 0.2 kg m². Wheel A has 0.1 kg m²."""
-    ratios = {"AB": -2.0, "BC": 0.5}
-    train = [{"name": f"{a}{b}", "joints": [a, b], "ratio": ratios[a + b]} for a, b in pairwise("ABC")]
-    found = moved(*wheels(0.0, 0.3, 0.2), coupling=train).driver("A")
-    assert_equal(found.torque, (0.1 + 2.0**2 * (0.2 + 0.3) + 1.0**2 * (0.3 + 0.2)) * SECOND)
-
-
-def test_each_of_two_motors_delivers_the_torque_of_its_own_wheels():
-    """Motor A drives wheel A, (J + I) φ''. Motor B, at 4 rad/s², drives wheel B and, at twice its rate, wheel
-    C: (J + I + 2² J') 4 N m."""
-    bodies, joints = wheels(0.2, 0.5, 0.0)
-    mesh = [{"name": "mesh", "joints": ["B", "C"], "ratio": 2.0}]
-    motors = [{"joint": "A", **TURN}, {"joint": "B", "polynomial": [0.0, 0.0, 2.0]}]
-    motion = moved(bodies, joints, coupling=mesh, driver=motors)
-    assert_equal(motion.driver("A").torque, (0.1 + 0.2) * SECOND)
-    assert_equal(motion.driver("B").torque, np.full(TIMES.size, (0.2 + 0.5 + 2.0**2 * 0.3) * 4.0))
-
-
 def test_motor_lifts_a_nut_by_its_screw():
     """The thread moves the nut by p φ against gravity: (J + I + p² m) φ'' + m g p."""
     mass, inertia, armature, pitch = 1.4, 0.05, 0.3, 0.2
@@ -110,38 +88,6 @@ def test_driven_rack_turns_its_pinion():
     assert_equal(found.force, (mass + armature + (inertia + rotor) / radius**2) * SECOND - 3.0 * mass)
     assert_equal(found.power, found.force * RATE)
     assert found.torque is None
-
-
-def test_reflected_mass_of_a_slide_on_a_turning_arm_meets_no_centripetal_acceleration():
-    """Force (m + I) r'' - m r φ'², and torque (J + m r²) φ'' + 2 m r r' φ', at r = 0.5 + 0.2 t - 0.3 t² m."""
-    mass, inertia, armature, start = 0.9, 0.02, 1.6, 0.5
-    bodies = [rod("arm", (0.0, 0.0, 0.0), 1.0, 0.3), rod("cart", (start, 0.0, 0.0), mass, inertia)]
-    joints = [
-        hinge("A", "ground", "arm", (0.0, 0.0, 0.0)),
-        slide("B", "arm", "cart", (start, 0.0, 0.0), X, armature=armature),
-    ]
-    motors = [{"joint": "A", **TURN}, {"joint": "B", "polynomial": [0.0, 0.2, -0.3]}]
-    motion = moved(bodies, joints, driver=motors)
-    place, speed = start + 0.2 * TIMES - 0.3 * TIMES**2, 0.2 - 0.6 * TIMES
-    assert_equal(motion.driver("B").force, (mass + armature) * -0.6 - mass * place * RATE**2)
-    turning = (0.3 + inertia + mass * place**2) * SECOND + 2 * mass * place * speed * RATE
-    assert_equal(motion.driver("A").torque, turning)
-
-
-def test_armature_of_a_hinge_between_turning_links_meets_their_relative_acceleration():
-    """The arm (J') turns by φ, and the hand (m, J), about its centre of mass at r, by -t² relative to the
-    arm. Its armature I resists this relative acceleration alone: motor B has J (φ'' - 2) - 2 I, and motor A
-    has (J' + m r²) φ'' + J (φ'' - 2)."""
-    arm, hand, armature, mass, reach = 0.3, 0.2, 0.7, 1.0, 0.4
-    bodies = [rod("arm", (0.0, 0.0, 0.0), 1.0, arm), rod("hand", (0.0, reach, 0.0), mass, hand)]
-    joints = [
-        hinge("A", "ground", "arm", (0.0, 0.0, 0.0)),
-        hinge("B", "arm", "hand", (0.0, reach, 0.0), armature=armature),
-    ]
-    motors = [{"joint": "A", **TURN}, {"joint": "B", "polynomial": [0.0, 0.0, -1.0]}]
-    motion = moved(bodies, joints, driver=motors)
-    assert_equal(motion.driver("B").torque, hand * (SECOND - 2.0) + armature * -2.0)
-    assert_equal(motion.driver("A").torque, (arm + mass * reach**2) * SECOND + hand * (SECOND - 2.0))
 
 
 def test_driver_delivers_what_spring_and_torque_of_its_joint_leave_over():
