@@ -1,10 +1,13 @@
 """Runs of methods that watch the rank end at a singular position; methods that claim to cross it are right
 after it."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from crosscheck.conformance.changes.units import scaled
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import closed_form
 from mbref import Limits, simulate
@@ -43,13 +46,15 @@ def first_crossing(scene: Scene, end: float) -> float:
     return float(brentq(lambda t: place(t)[0], times[k], times[k + 1]))
 
 
-@pytest.mark.parametrize("method", WATCHING)
-@pytest.mark.parametrize("loop", LOOPS)
+HEAVY = {"heavy": (scaled(four_bar_gravity(0.3, "heavy"), 1e9), 1.0)}  # unit rows have pivots without mass
+
+
+@pytest.mark.parametrize(("loop", "method"), [*product(LOOPS, WATCHING), ("heavy", WATCHING[0])])
 def test_run_that_watches_the_rank_ends_at_the_first_singular_position(loop, method):
     """WATCHING are methods that claim no crossing. LOOPS, two parallelograms and a slider-crank, end
     uncrossed, within 0.2 % of their duration at the closed form's first singular time. The message names a
     method that crosses."""
-    scene, end = LOOPS[loop]
+    scene, end = (LOOPS | HEAVY)[loop]
     time = first_crossing(scene, end)
     run = simulate(scene, method, np.linspace(0.0, end, 41))
     assert Method.parse(method).crosses == "no"
