@@ -34,21 +34,27 @@ from mbref.scene.fields import meant
 from mbref.scene.joints import ANGLE
 from mbref.scene.validation import DRIVABLE
 
-LEFT = 1e-6  # work that motors cannot do / largest work of the drivers, below which it is rounding
+# work that motors cannot do / largest work of the drivers, and / work of each driver's force alone along the
+# same velocity, below either of which it is rounding
+LEFT, LEFT_ALONG = 1e-9, 1e-6
+NEAR = 10 * OPEN  # singular value / largest one, below which rounding of the drivers' forces is magnified
 MOVES = 1e-3  # velocity of a body / largest one, in lengths and rad, below which the body stands still
 
 
 @dataclass(frozen=True)
 class _Sample:
-    """Motors at one sample: degrees of freedom, rank of B N, the scaled τ (m,), whether others can replace a
-    motor (m,), the work (n,) by velocity that the motors cannot do, and the largest work of the drivers."""
+    """Motors at one sample: degrees of freedom, rank of B N, whether both are certain, the scaled τ (m,),
+    whether others can replace a motor (m,), the work (n,) by velocity that the motors cannot do, the largest
+    work of the drivers, and the sum of the sizes of their works along the direction of ``left``."""
 
     freedoms: int
     rank: int
+    is_certain: bool
     forces: np.ndarray
     is_open: np.ndarray
     left: np.ndarray
     work: float
+    along: float
 
 
 def inverse_dynamics(motion: Motion, motors: Sequence[str]) -> Motion:
@@ -85,10 +91,14 @@ def inverse_dynamics(motion: Motion, motors: Sequence[str]) -> Motion:
         raise InputError(
             f"inverse dynamics of {scene.name} needs masses of all bodies, reactions and accelerations"
         )
-    samples, length = _samples(scene, motion, motors, forces)
-    freedoms = min((each.freedoms for each in samples), default=0)
-    rank = max((each.rank for each in samples if each.freedoms == freedoms), default=0)
-    regular = np.array([each.freedoms == freedoms and each.rank == rank for each in samples], dtype=bool)
+    samples, length, at_start = _samples(scene, motion, motors, forces)
+    certain = [each for each in samples if each.is_certain]
+    freedoms = min((each.freedoms for each in certain), default=0)
+    freedoms = min(freedoms, at_start)  # all samples may be near singular positions
+    rank = max((each.rank for each in certain if each.freedoms == freedoms), default=0)
+    regular = np.array(
+        [s.is_certain and (s.freedoms, s.rank) == (freedoms, rank) for s in samples], dtype=bool
+    )
     _refuse_missing(scene, motion, motors, [s if r else None for s, r in zip(samples, regular, strict=True)])
     found = {}
     for k, joint in enumerate(map(scene.joint_named, motors)):
@@ -105,6 +115,8 @@ def inverse_dynamics(motion: Motion, motors: Sequence[str]) -> Motion:
 
 def check_motors(scene: Scene, motors: Sequence[str]) -> None:
     """Raise InputError for joints that cannot have a motor, and for scenes without inverse dynamics."""
+    if isinstance(motors, str):
+        raise InputError(f"motors: needs a list of names, such as [{motors!r}], not a text")
     names = [joint.name for joint in scene.joint]
     for name in motors:
         if name not in names:
@@ -124,14 +136,15 @@ def check_motors(scene: Scene, motors: Sequence[str]) -> None:
 
 def _samples(
     scene: Scene, motion: Trajectory, motors: Sequence[str], forces: dict[str, np.ndarray]
-) -> tuple[list[_Sample], float]:
-    """Return the motors at each sample, and the length (m) of the mechanism."""
+) -> tuple[list[_Sample], float, int]:
+    """Return the motors at each sample, the length (m) of the mechanism, and the degrees of freedom of its
+    first pose."""
     model = Model(without_armatures(assembled(scene)).with_(driver=()))
     q, _, _ = coordinates(model, motion)
     q = q.reshape(len(q), model.nb, 7)
     blocks = model.terms(motion.times, q, angles=angles_from_start(model, scene, motion)).blocks
     own, others = (
-        [_row(model, motion, q, scene.joint_named(name)) for name in each] for each in (motors, forces)
+        [_row(model, motion, q, model.scene.joint_named(name)) for name in each] for each in (motors, forces)
     )
     scaled = [
         size * (1.0 if scene.joint_named(name).facts.driven == ANGLE else model.length)
@@ -141,13 +154,15 @@ def _samples(
         _at(
             unit_rows(model.structure.dense(blocks[k]) * model.units),
             np.array([row[k] for row in own]),
-            np.array([size[k] for size in scaled]) @ np.array([row[k] for row in others]),
+            np.array([size[k] for size in scaled])[:, None] * np.array([row[k] for row in others]),
         )
         for k in range(len(q))
     ]
-    length = model.length
+    first = model.start().reshape(1, model.nb, 7)
+    rows = model.terms(np.zeros(1), first).blocks[0]
+    length, (basis, _) = model.length, _free(unit_rows(model.structure.dense(rows) * model.units))
     model.release()
-    return found, length
+    return found, length, basis.shape[1]
 
 
 def _row(model: Model, motion: Trajectory, q: np.ndarray, joint: Joint) -> np.ndarray:
@@ -172,18 +187,38 @@ def _row(model: Model, motion: Trajectory, q: np.ndarray, joint: Joint) -> np.nd
 
 
 def _at(rows: np.ndarray, own: np.ndarray, demanded: np.ndarray) -> _Sample:
-    """Return the motors with rows B (m, n), for constraint rows (c, n) and the drivers' work Dᵀ f (n,)."""
-    _, values, vt = np.linalg.svd(rows)
-    basis = vt[int((values > OPEN * values.max(initial=0.0)).sum()) :].T
+    """Return the motors with rows B (m, n), for constraint rows (c, n) and the work of each driver (d, n)."""
+    basis, is_near = _free(rows)
     u, s, wt = np.linalg.svd(own @ basis)
-    rank = int((s > OPEN * np.linalg.norm(own, axis=1).max()).sum())
-    work = basis.T @ demanded
+    longest = np.linalg.norm(own, axis=1).max()
+    rank = int((s > OPEN * longest).sum())
+    work = basis.T @ demanded.sum(axis=0)
     part = wt[:rank] @ work
     is_open = np.linalg.norm(u[:, rank:], axis=1) > SHARE
     left = basis @ (work - wt[:rank].T @ part)
+    direction = np.abs(left) / max(float(np.linalg.norm(left)), 1e-300)
     return _Sample(
-        basis.shape[1], rank, u[:, :rank] @ (part / s[:rank]), is_open, left, np.abs(work).max(initial=0.0)
+        freedoms=basis.shape[1],
+        rank=rank,
+        is_certain=not (is_near or _is_near(s, longest)),
+        forces=u[:, :rank] @ (part / s[:rank]),
+        is_open=is_open,
+        left=left,
+        work=np.abs(work).max(initial=0.0),
+        along=float((np.abs(demanded) @ direction).sum()),
     )
+
+
+def _free(rows: np.ndarray) -> tuple[np.ndarray, bool]:
+    """Return a basis (n, f) of velocities that constraint rows (c, n) allow, and whether f is uncertain."""
+    _, values, vt = np.linalg.svd(rows)
+    largest = values.max(initial=0.0)
+    return vt[int((values > OPEN * largest).sum()) :].T, _is_near(values, largest)
+
+
+def _is_near(values: np.ndarray, largest: float) -> bool:
+    """Return whether a singular value is so small that its rank is uncertain, and not rounding."""
+    return bool(((values > OPEN * largest) & (values <= NEAR * largest)).any())
 
 
 def _refuse_missing(
@@ -192,7 +227,7 @@ def _refuse_missing(
     """Raise InputError if the motors cannot do the work of the drivers at a sample; None is undecided."""
     largest = max((each.work for each in samples if each), default=0.0)
     for t, each in zip(motion.times, samples, strict=True):
-        if each is None or np.abs(each.left).max(initial=0.0) <= LEFT * largest:
+        if each is None or np.linalg.norm(each.left) <= max(LEFT * largest, LEFT_ALONG * each.along):
             continue
         speeds = np.linalg.norm(each.left.reshape(-1, 6), axis=1)[: len(scene.body)]
         moved = [b.name for b, v in zip(scene.body, speeds, strict=True) if v > MOVES * speeds.max()]

@@ -205,6 +205,8 @@ class DerivativeRequest:
         """Return -1 for columns (k, outputs) of quaternions that have the other sign in the first motion."""
         assert self.motion is not None
         k, model = states.times.size, self.model
+        if not k:  # the motion meets a singular position before the first sample
+            return np.ones((0, len(names)))
         arrays = states.q.reshape(k, -1, 7), states.v.reshape(k, -1, 6), states.a.reshape(k, -1, 6)
         own = model.motion(*arrays)["orientation"]
         signs = np.where((own * self.motion.orientation[:k]).sum(axis=2) < 0.0, -1.0, 1.0)

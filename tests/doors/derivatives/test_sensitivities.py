@@ -239,6 +239,8 @@ def test_derivatives_end_undecided_at_a_singular_position():
     assert found.outcome is mbref.Outcome.UNDECIDED
     assert np.isfinite(found.values[0]).all()
     assert np.isnan(found.values[1]).all()
+    later = mbref.sensitivities("four_bar_gravity", ["A.angle"], ["gravity.y"], [0.3])
+    assert np.isnan(later.values).all() and "singular position" in later.message
 
 
 def test_command_prints_and_writes_the_derivatives_of_the_function(tmp_path, capsys):

@@ -15,8 +15,9 @@ from crosscheck.judge.driver_forces import driver_forces
 from crosscheck.judge.gauss_principle import rank
 from mbref.cli.commands import main
 from mbref.scene import Driver, Factor, Free, JointTorque, Scene
+from tests.helpers import parts
 from tests.helpers.changed_scenes import in_another_order, in_other_units
-from tests.helpers.statics import DOWN, G
+from tests.helpers.statics import DOWN, G, hinge
 
 ARM = Path(__file__).parents[3] / "examples" / "five_bar_arm.toml"
 INNER, OUTER, BASE, TOOL = 0.3, np.sqrt(0.08), 0.4, (0.2, 0.5)  # m
@@ -200,6 +201,77 @@ def test_motors_of_a_driven_crank_are_undecided_at_singular_positions_only(name,
     assert total[regular] == pytest.approx(power[regular], rel=1e-9)
 
 
+@pytest.mark.parametrize("times", [0.25 - np.geomspace(1e-4, 1e-8, 9), np.array([0.2499999, 0.25000001])])
+@pytest.mark.parametrize("motor", "AD")
+def test_motor_near_a_folded_crank_has_its_limit_or_is_undecided(motor, times):
+    """The rod is as long as the crank A, which turns by 2 π rad/s and is upright at 0.25 s. Nearby the power
+    of the driver, and so of a motor, is in proportion to the time that is left. It is met to 1e-3, or not
+    given."""
+    driver = Driver(joint="A", polynomial=(0.0, 2 * np.pi))
+    scene = mbref.find_scene("planar_slider_crank_equal").with_(gravity=DOWN, load=(), driver=[driver])
+    slope = mbref.simulate(scene, times=[0.249], rtol=1e-13).driver("A").power[0] / 0.001  # W/s
+    motion = mbref.simulate(scene, times=times, rtol=1e-13)
+    power = mbref.inverse_dynamics(motion, [motor]).motors[motor].power
+    decided = ~np.isnan(power)
+    assert power[decided] == pytest.approx(slope * (0.25 - motion.times[decided]), rel=1e-3)
+    assert not decided[motion.times > 0.25 - 1e-6].any()
+
+
+def geared_sled() -> Scene:
+    """Return a rod on hinge A, which a wheel turns by gears with an offset of 0.6 rad, and a sled on the rod,
+    whose drive along x is named tip."""
+    rod, wheel, sled = (
+        {"name": name, "mass": 1.0, "inertia": [0.1] * 3, "position": [x, 0.0, 0.0]}
+        for name, x in (("rod", 0.5), ("wheel", 3.0), ("sled", 0.8))
+    )
+    path = {"polynomial": [0.0, 0.1, 0.2]}
+    return Scene(
+        name="sled",
+        gravity=DOWN,
+        duration=0.5,
+        body=[rod, wheel, sled],
+        joint=[
+            hinge("A", ("ground", "rod")),
+            hinge("W", ("ground", "wheel"), (3.0, 0.0, 0.0)),
+            parts.slide("S", "rod", "sled", (0.8, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        ],
+        coupling=[{"name": "gears", "joints": ["W", "A"], "ratio": 1.0, "offset": 0.6}],
+        driver=[
+            {"joint": "W", **path},
+            {"name": "tip", "body": "sled", "point": [0.8, 0.0, 0.0], "along": [1.0, 0.0, 0.0], **path},
+        ],
+    )
+
+
+def test_motors_move_a_rod_and_sled_that_an_offset_turns_at_the_start_by_newtons_equations():
+    """The force of S is m (r'' - g) of the sled along the rod. The torque of A about the origin is that of
+    rod and sled, Σ (r × m (r'' - g) + J ω'), and J ω' of the wheel, which turns with the rod."""
+    motion = mbref.simulate(geared_sled(), times=[0.0, 0.2, 0.4], rtol=1e-12)
+    found = mbref.inverse_dynamics(motion, ["A", "S"]).motors
+    bodies = [motion["rod"], motion["sled"]]
+    lift = [body.acceleration[:, :2] + [0.0, G] for body in bodies]
+    turning = sum(motion[name].angular_acceleration[:, 2] for name in ("rod", "sled", "wheel"))
+    moments = (cross(b.position[:, :2].T, a.T) for b, a in zip(bodies, lift, strict=True))
+    along = bodies[0].position[:, :2] / 0.5
+    assert found["S"].force == pytest.approx((along * lift[1]).sum(axis=1), rel=1e-9)
+    assert found["A"].torque == pytest.approx(sum(moments) + 0.1 * turning, rel=1e-9)
+
+
+def test_hand_of_a_gram_on_an_arm_of_a_hundred_kilograms_needs_its_own_motor():
+    """The hand's driver exerts 5e-5 N m, a ten-millionth of the arm's torque; the hand would swing freely."""
+    arm = {"name": "arm", "position": [0.5, 0.0, 0.0], "mass": 100.0, "inertia": [0.01, 8.3, 8.3]}
+    hand = {"name": "hand", "position": [1.005, 0.0, 0.0], "mass": 1e-3, "inertia": [1e-9, 8e-9, 8e-9]}
+    joints = [hinge("A", ("ground", "arm")), hinge("B", ("arm", "hand"), (1.0, 0.0, 0.0))]
+    drivers = [
+        {"joint": "A", "sine": {"amplitude": 0.3, "frequency": 3.0}},
+        {"joint": "B", "sine": {"amplitude": 0.5, "frequency": 5.0}},
+    ]
+    scene = Scene(name="arm", gravity=DOWN, body=[arm, hand], joint=joints, driver=drivers)
+    motion = mbref.simulate(scene, times=np.linspace(0.0, 1.0, 5))
+    with pytest.raises(mbref.InputError, match="at rest hand can still move"):
+        mbref.inverse_dynamics(motion, ["A"])
+
+
 BARE = [body.model_copy(update={"mass": None, "inertia": None}) for body in arm().body]
 RESTING = "with all of them at rest left arm, right arm, right can still move: 2 degrees of freedom"
 
@@ -207,18 +279,19 @@ RESTING = "with all of them at rest left arm, right arm, right can still move: 2
 @pytest.mark.parametrize(
     ("motors", "changes", "sentence"),
     [
-        ("A", {}, RESTING),
-        ("AQ", {}, "no joint 'Q'; joints: A, B, P, D, E, tool x, tool y"),
-        ("AA", {}, "needs at least one joint, and each joint once"),
-        ("AE", {"driver": ()}, "no driver"),
-        ("AE", {"body": BARE}, "needs masses"),
+        (["A"], {}, RESTING),
+        (["A", "Q"], {}, "no joint 'Q'; joints: A, B, P, D, E, tool x, tool y"),
+        (["A", "A"], {}, "needs at least one joint, and each joint once"),
+        ("AE", {}, "needs a list of names, such as ['AE'], not a text"),
+        (["A", "E"], {"driver": ()}, "no driver"),
+        (["A", "E"], {"body": BARE}, "needs masses"),
     ],
 )
 def test_motors_that_cannot_cause_the_motion_are_refused(motors, changes, sentence):
     """One motor for two degrees of freedom; unknown joints; nothing that motors could replace; no masses."""
     motion = mbref.simulate(arm().with_(**changes), times=[0.0, 0.01])
     with pytest.raises(mbref.InputError) as refusal:
-        mbref.inverse_dynamics(motion, [*motors])
+        mbref.inverse_dynamics(motion, motors)
     assert sentence in str(refusal.value)
 
 
