@@ -64,7 +64,7 @@ def test_steady_poses_are_balanced_with_symmetric_positive_mass_matrix(judged):
 
 def test_four_bar_with_diagonal_spring_rests_at_the_published_angle():
     """The IFToMM benchmark prints the crank's angle, 2.23433101898 rad, up to 4e-11 rad."""
-    cranks = [each.position[0] for each in steady_poses(spring_four_bar(), starts=1)]
+    cranks = [each.position[0] for each in steady_poses(spring_four_bar(), starts=8)]
     angles = np.array([np.arctan2(crank[2], crank[0]) for crank in cranks])
     assert np.abs(angles - 2.23433101898).min() < 5e-11
 
