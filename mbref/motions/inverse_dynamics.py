@@ -37,7 +37,9 @@ from mbref.scene.validation import DRIVABLE
 # work that motors cannot do / largest work of the drivers, and / work of each driver's force alone along the
 # same velocity, below either of which it is rounding
 LEFT, LEFT_ALONG = 1e-9, 1e-6
-NEAR = 10 * OPEN  # singular value / largest one, below which rounding of the drivers' forces is magnified
+UNCERTAIN = (
+    10 * OPEN
+)  # singular value / largest one, below which rounding of the drivers' forces is magnified
 MOVES = 1e-3  # velocity of a body / largest one, in lengths and rad, below which the body stands still
 
 
@@ -218,7 +220,7 @@ def _free(rows: np.ndarray) -> tuple[np.ndarray, bool]:
 
 def _is_near(values: np.ndarray, largest: float) -> bool:
     """Return whether a singular value is so small that its rank is uncertain, and not rounding."""
-    return bool(((values > OPEN * largest) & (values <= NEAR * largest)).any())
+    return bool(((values > OPEN * largest) & (values <= UNCERTAIN * largest)).any())
 
 
 def _refuse_missing(
