@@ -18,6 +18,7 @@ import numpy as np
 from crosscheck.differentiating import Differentiating, OwnDerivatives, TangentDerivatives
 from crosscheck.engine import Cannot, Engine, Owner
 from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.small_motions.equations import CENTRAL
 from crosscheck.judge.state_derivatives import StateDerivatives, bounded_derivatives
 from mbref.scene import Scene, intermittent
 
@@ -30,13 +31,11 @@ SAFETY = 3.0  # factor on the uncertainty of the truth, below which an error pro
 STEP = 2e-3  # of differences of order 8 of kinematics, rad or lengths of the mechanism
 FINER = 10.0  # of differences of accelerations, of whose steps the two that agree best are taken
 STEPS = (2e-3, 2e-4, 2e-5, 2e-6)
-FAST = (
-    1.0  # rad/s, or lengths of the mechanism over s: step of differences by velocities, which are quadratic
-)
+# rad/s, or lengths of the mechanism over s: step of differences by velocities, which are quadratic
+FAST = 1.0
 OPENED = 0.02  # displacement, rad or lengths, that opens loops
 UNMOVED = 1e-3  # weight of rates of stand-ins, whose spin the bodies leave open
 SAME = 1e-8  # part of the twists that an engine's coordinates may miss
-CENTRAL = ((1, 4 / 5), (2, -1 / 5), (3, 4 / 105), (4, -1 / 280))  # weights of differences of order 8
 Source = tuple[str, str, str, str, str]  # engine, version, function, scene, state of a Row
 STILL = {"velocity": None, "angular_velocity": None}
 
@@ -91,17 +90,19 @@ def rows(engine: Engine, scene: Scene) -> Iterator[Row]:
     ):
         states = {MOVING: (bare, true), **states}
     for function in engine.differentiates_by:
+        found = {state: engine.own_derivatives(at, function) for state, (at, _) in states.items()}
+        source = (engine.name, engine.version(), function, bare.name)
         for state, (at, judged) in states.items():
-            yield from _at(engine, function, state, at, judged)
-        first = next(iter(states.values()))[0]
-        yield from _open(engine, function, first)
+            yield from _at(found[state], (*source, state), at, judged)
+        first = next(iter(states))
+        if isinstance(own := found[first], OwnDerivatives):
+            yield from _open(engine, own, (*source, OPEN), states[first][0])
 
 
-def _at(engine: Engine, function: str, state: str, scene: Scene, judged: StateDerivatives) -> Iterator[Row]:
+def _at(
+    found: OwnDerivatives | TangentDerivatives, source: Source, scene: Scene, judged: StateDerivatives
+) -> Iterator[Row]:
     """Yield the errors at a state on the constraints."""
-    assert isinstance(engine, Differentiating)
-    found = engine.own_derivatives(scene, function)
-    source = (engine.name, engine.version(), function, scene.name, state)
     named = _components(scene)
     if isinstance(found, OwnDerivatives):
         tangent = along_constraints(found, judged, scene)
@@ -122,15 +123,13 @@ def _at(engine: Engine, function: str, state: str, scene: Scene, judged: StateDe
         yield from _by_differences(found, source, scene)
 
 
-def _open(engine: Engine, function: str, scene: Scene) -> Iterator[Row]:
-    """Yield the errors against the engine's own accelerations at a state with open loops."""
-    assert isinstance(engine, Differentiating)
-    found = engine.own_derivatives(scene, function)
-    if not isinstance(found, OwnDerivatives) or not _is_smooth(found, scene):
+def _open(engine: Differentiating, found: OwnDerivatives, source: Source, scene: Scene) -> Iterator[Row]:
+    """Yield the errors against the engine's own accelerations, with loops opened from a state."""
+    if not _is_smooth(found, scene):
         return
-    opened = engine.own_derivatives(scene, function, _away(found, scene))
+    opened = engine.own_derivatives(scene, source[2], _away(found, scene))
     assert isinstance(opened, OwnDerivatives)
-    yield from _by_differences(opened, (engine.name, engine.version(), function, scene.name, OPEN), scene)
+    yield from _by_differences(opened, source, scene)
 
 
 def _away(found: OwnDerivatives, scene: Scene) -> np.ndarray:
@@ -191,10 +190,11 @@ def along_constraints(found: OwnDerivatives, judged: StateDerivatives, scene: Sc
     sizes[[*found.stand_ins]] *= UNMOVED
     closing = np.array([found.opening(nothing, e) for e in np.eye(len(v))]).T
     # largest rate of a closure is one, so that engines may scale their rows
-    whole = np.concatenate([twists, closing / (np.abs(closing).max(initial=0.0) or 1.0)])
+    largest = np.abs(closing).max(initial=0.0) or 1.0
+    whole = np.concatenate([twists, closing / largest])
 
     def solved(twist: np.ndarray, opening: np.ndarray) -> np.ndarray:
-        wanted = np.concatenate([twist, opening / (np.abs(closing).max(initial=0.0) or 1.0)])
+        wanted = np.concatenate([twist, opening / largest])
         rates = np.linalg.lstsq(whole * sizes, wanted, rcond=SAME)[0] * sizes
         if np.abs(whole @ rates - wanted).max(initial=0.0) > SAME * np.abs(wanted).max(initial=1.0):
             raise ValueError(f"{scene.name}: the engine's coordinates do not move as the joints allow")

@@ -37,9 +37,8 @@ from mbref.scene.validation import DRIVABLE
 # work that motors cannot do / largest work of the drivers, and / work of each driver's force alone along the
 # same velocity, below either of which it is rounding
 LEFT, LEFT_ALONG = 1e-9, 1e-6
-UNCERTAIN = (
-    10 * OPEN
-)  # singular value / largest one, below which rounding of the drivers' forces is magnified
+# singular value / largest one, below which rounding of the drivers' forces is magnified
+UNCERTAIN = 10 * OPEN
 MOVES = 1e-3  # velocity of a body / largest one, in lengths and rad, below which the body stands still
 
 

@@ -71,8 +71,7 @@ class _Differentiated:
         pin, model, data = self.pin, self.model, self.model.createData()
         q = pin.integrate(model, self.mechanism.q0, at)
         q = pin.integrate(model, q, step + np.zeros(self.nv))
-        forces = pin.StdVec_RigidConstraintData()
-        forces.extend([closure.createData() for closure in self.closures])
+        forces = self._forces()
         solver = pin.ProximalSettings(*SOLVER)
         pin.initConstraintDynamics(model, data, self.closures, forces)
         found = pin.constraintDynamics(model, data, q, v, force, self.closures, forces, solver).copy()
@@ -80,14 +79,19 @@ class _Differentiated:
             pin.computeConstraintDynamicsDerivatives(model, data, self.closures, forces, solver)
         return found, data
 
+    def _forces(self) -> Any:
+        """Return new data of the closures."""
+        found = self.pin.StdVec_RigidConstraintData()
+        found.extend([closure.createData() for closure in self.closures])
+        return found
+
     def opening(self, step: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return the rates (m,) at which the closures open."""
         pin, model, data = self.pin, self.model, self.model.createData()
         if not len(self.closures):
             return np.zeros(0)
         pin.computeJointJacobians(model, data, pin.integrate(model, self.mechanism.q0, step))
-        forces = pin.StdVec_RigidConstraintData()
-        forces.extend([closure.createData() for closure in self.closures])
+        forces = self._forces()
         for closure, own in zip(self.closures, forces, strict=True):
             closure.calc(model, data, own)
         return np.asarray(pin.getConstraintsJacobian(model, data, self.closures, forces) @ v)
