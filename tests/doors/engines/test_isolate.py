@@ -180,6 +180,7 @@ def test_the_last_line_that_an_engine_prints_in_its_preparation_is_known_meanwhi
         seen = set()
         while not made.done():
             seen |= set(starting().values())
+            time.sleep(0.001)
         assert made.result().outcome is Outcome.COMPLETED, made.result().message
     assert seen - {f"{FAKES}:COMPILING plain starts"} == {"compiling kernels"}
     assert not starting()
