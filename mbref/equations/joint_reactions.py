@@ -26,6 +26,7 @@ from mbref.scene.bodies import DRIVER
 
 MOST_OPEN_ROWS = 120  # rows; for more, singular values at every sample take longer than the run
 OPEN = 1e-6  # singular value of unit rows / largest one: below it a combination of rows vanishes
+UNBALANCED = 1e-9  # such a value, below which no reactions along the combination are computed
 SHARE = 1e-6  # weight of a joint in such a combination below which it does not take part
 
 
@@ -66,25 +67,33 @@ def least_reactions(
     angles: np.ndarray | None = None,
 ) -> dict[str, np.ndarray]:
     """Return ``reactions`` of least norm, if redundant rows leave a choice and are few."""
-    if model.m <= MOST_OPEN_ROWS and model.once(_is_redundant):
+    if model.m <= MOST_OPEN_ROWS and model.once(_redundant_at_start):
         multipliers = _of_least_norm(model, blocks, multipliers)
     return reactions(model, q, blocks, multipliers, angles)
 
 
-def _is_redundant(model: Model) -> bool:
-    """Return whether a combination of rows vanishes at the scene's pose."""
-    return vanishing_combinations(model, model.terms(0.0, model.start()).blocks[None])[0].size > 0
+def _redundant_at_start(model: Model) -> int:
+    """Return the number of combinations of rows that vanish at the scene's pose."""
+    return vanishing_combinations(model, model.terms(0.0, model.start()).blocks[None]).along.shape[-1]
+
+
+def _always_redundant(model: Model, vanishing: VanishingCombinations) -> int:
+    """Return the number of combinations of rows that vanish at every sample, and at the scene's pose."""
+    found = np.any(vanishing.along != 0.0, axis=1).sum(axis=1)
+    return min(model.once(_redundant_at_start), int(found.min(initial=model.m)))
 
 
 def _of_least_norm(model: Model, blocks: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-    """Return λ (k, m) without the part along vanishing combinations of rows.
+    """Return λ (k, m) without the part along combinations of rows that vanish at every pose.
 
     A run computes this part with a penalty, which magnifies rounding. The norm is of rows of unit length in
-    the metric of projections.
+    the metric of projections. Near a singular position, a further combination nearly vanishes, along which
+    the reactions may be large.
     """
-    vanishing, lengths = vanishing_combinations(model, blocks)
+    vanishing = vanishing_combinations(model, blocks)
+    first = vanishing.along.shape[-1] - _always_redundant(model, vanishing)
     units = row_lengths(model.structure.dense(blocks) * model.data.metric_root)
-    along = (units / lengths)[..., None] * vanishing
+    along = (units / vanishing.lengths)[..., None] * vanishing.along[..., first:]
     part = along @ (np.linalg.pinv(along, rcond=OPEN) @ (units * multipliers)[..., None])
     return np.asarray(multipliers - part[..., 0] / units)
 
@@ -180,9 +189,12 @@ def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray]:
 
     Redundant rows leave reactions undetermined at all times, a singular position only when the motion passes
     it. At a singular position a linear combination of rows vanishes, a left null vector of Φ_q (Wojtyra, J.
-    Theor. Appl. Mech. 43, 2005). The argument ``blocks`` (k, m, 12) contains Φ_q.
+    Theor. Appl. Mech. 43, 2005). There, no finite reactions may balance the forces, and no driver's force is
+    determined. The argument ``blocks`` (k, m, 12) contains Φ_q.
     """
-    vanishing, _ = vanishing_combinations(model, blocks)
+    combinations = vanishing_combinations(model, blocks)
+    vanishing, always = combinations.along, _always_redundant(model, combinations)
+    is_singular = (combinations.values < UNBALANCED).sum(axis=1) > always
     rows = dict.fromkeys((joint.name for joint in model.scene.joint), slice(0))  # joints without rows
     held = tuple(name for name in rows if name in model.structure.row_joint)
     _, _, of, starts = _places(model.structure, held)
@@ -190,7 +202,10 @@ def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray]:
     for d, driver in enumerate(model.scene.driver):
         row = int(model.structure.row[model.structure.driver == d][0])
         rows[DRIVER.format(driver.joint)] = slice(row, row + 1)
-    return {name: np.sum(_singular_values(vanishing[:, own]) > SHARE, axis=1) for name, own in rows.items()}
+    found = {name: np.sum(_singular_values(vanishing[:, own]) > SHARE, axis=1) for name, own in rows.items()}
+    for driver in model.scene.driver:
+        found[DRIVER.format(driver.joint)] |= is_singular
+    return found
 
 
 def determined_components(
@@ -214,26 +229,41 @@ def open_changes(
 ) -> Iterator[dict[str, np.ndarray]]:
     """Yield by joint the changes (k, 6) of its reaction by each vanishing combination of unit rows, with
     forces times the mechanism's length; arguments as for ``reactions``."""
-    vanishing, lengths = vanishing_combinations(model, blocks)
+    vanishing = vanishing_combinations(model, blocks)
     units = np.repeat([model.length, 1.0], 3)
-    for k in range(vanishing.shape[-1]):
-        found = reactions(model, q, blocks, vanishing[..., k] / lengths, angles)
+    for k in range(vanishing.along.shape[-1]):
+        found = reactions(model, q, blocks, vanishing.along[..., k] / vanishing.lengths, angles)
         yield {name: change * units for name, change in found.items()}
 
 
-def vanishing_combinations(model: Model, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return left null vectors (k, m, c) of the unit rows of Φ_q, and the lengths (k, m) of its rows.
+class VanishingCombinations(NamedTuple):
+    """Left null vectors (k, m, c) of unit rows, the lengths (k, m) of the rows, and the singular values
+    (k, c) of the vectors over the largest one."""
+
+    along: np.ndarray
+    lengths: np.ndarray
+    values: np.ndarray
+
+
+def vanishing_combinations(model: Model, blocks: np.ndarray) -> VanishingCombinations:
+    """Return left null vectors of the unit rows of Φ_q.
 
     Displacements are in units of the mechanism, so that its size has no influence. The argument is Φ_q as
     blocks (k, m, 12). Samples with fewer null vectors than other samples have zeros in place of the missing
-    vectors.
+    vectors, and their singular values.
     """
     jacobian = model.structure.dense(blocks) * model.units
     lengths = row_lengths(jacobian)
     left, values, _ = np.linalg.svd(jacobian / lengths[..., None])
-    rank = np.sum(values > OPEN * values.max(axis=1, initial=0.0)[:, None], axis=1)
+    values = values / np.maximum(values.max(axis=1, initial=0.0), 1e-300)[:, None]
+    rank = np.sum(values > OPEN, axis=1)
     least = int(rank.min(initial=model.m))
-    return (left * (np.arange(model.m) >= rank[:, None])[:, None, :])[..., least:], lengths
+    missing = np.zeros((len(values), model.m - values.shape[1]))  # more rows than coordinates
+    return VanishingCombinations(
+        (left * (np.arange(model.m) >= rank[:, None])[:, None, :])[..., least:],
+        lengths,
+        np.concatenate([values, missing], axis=1)[:, least:],
+    )
 
 
 def _singular_values(matrices: np.ndarray) -> np.ndarray:

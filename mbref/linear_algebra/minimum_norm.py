@@ -41,6 +41,7 @@ ALPHA = 1e10  # penalty of projections and single solutions; singular values bel
 # largest number of iterations of a system that is solved once; relative change that ends them
 ITERATIONS, LAST_CHANGE = 20, 1e-15
 OF_BODY = 6  # columns of a body, in matrices that are solved once
+UNFINISHED = 1e-12  # change of multipliers / multipliers, above which an iteration ended too early
 DEPENDENT_ROW = 1e-11  # singular value of unit rows below which a remaining row counts as dependent
 FACTOR = Named(SparseFactor)
 
@@ -195,7 +196,7 @@ def find_least_multipliers(factor, force, multipliers):
     for j in range(column.shape[0]):
         x[j] = factor.root[j] * force[column[j]] * factor.share[j]
     total[:] = 0.0
-    before = inf
+    before, change, size, scale = inf, 0.0, 0.0, product(x, x)
     for _ in range(ITERATIONS):
         factor.residual[:] = 0.0
         subtract_product(factor, x, factor.residual)
@@ -210,7 +211,40 @@ def find_least_multipliers(factor, force, multipliers):
         if not LAST_CHANGE * LAST_CHANGE * size < change < before:
             break
         before = change
+    if change > UNFINISHED * UNFINISHED * size:  # near a singular position
+        factor.residual[:] = 0.0
+        subtract_product(factor, x, factor.residual)
+        balance_along_conjugate_directions(factor, scale)
     write_multipliers(row, total, multipliers)
+
+
+@kernel
+def balance_along_conjugate_directions(factor, scale):
+    """Add to the multipliers in ``total`` those that the remaining forces x need, with -D x in ``residual``:
+    conjugate gradients for S λ = D x with S + I/α as preconditioner. ``scale`` is the square of the norm of
+    all forces.
+
+    Combinations of rows that are dependent to DEPENDENT_ROW take no part.
+    """
+    residual, step, change, direction = factor.residual, factor.step, factor.change, factor.direction
+    direction[:], before = 0.0, 1.0
+    for _ in range(ITERATIONS):
+        copy(residual, step)
+        solve(factor, step)
+        along = product(residual, step)
+        if along <= ALPHA * LAST_CHANGE * LAST_CHANGE * scale:
+            break
+        for i in range(step.shape[0]):
+            direction[i] = step[i] + along / before * direction[i]
+        times_transpose(factor, direction, change)
+        square, before = product(change, change), along
+        if along * ALPHA * DEPENDENT_ROW**2 >= square:
+            break
+        for i in range(step.shape[0]):
+            factor.total[i] -= along / square * direction[i]
+        for j in range(change.shape[0]):
+            change[j] *= along / square
+        subtract_product(factor, change, residual)
 
 
 @entry(INT(VECTOR, VECTOR, FACTOR))

@@ -64,7 +64,8 @@ def first_lengths(left, memory):
     across = regular if loose == tight else min(longest_step(loose, memory), left)
     ahead = step.time_to_pole if step.time_to_pole > 0.0 else memory.distance.time_to_crossing
     memory.distance.time_to_crossing = 0.0
-    if across < CROSSING_MARGIN * ahead and regular > (1.0 - MIN_PIVOT_RATIO) * ahead:
+    is_deep = regular > (1.0 - MIN_PIVOT_RATIO) * ahead and regular < left
+    if across < CROSSING_MARGIN * ahead and is_deep:
         regular = across = ahead - CROSSING_START * across
     return regular, across
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import engine, installed
-from mbref import Motion, Scene, simulate
+from mbref import Motion, Scene, find_scene, simulate
 from mbref.cli.commands import main
 from tests.helpers.parts import Entry, Point, X, Z, hinge, joint, slide
 from tests.helpers.statics import rod
@@ -155,3 +155,32 @@ def test_driver_of_a_body_without_mass_has_no_torque_and_no_power():
     found = moved(bare, joints).driver("A")
     assert found.torque is None and found.power is None
     assert moved(bodies, joints).driver("A").torque is not None, "known with the masses"
+
+
+@pytest.mark.parametrize("offsets", [[-1e-3, -1e-5, -1e-6, -1e-7, 1e-7, 1e-6, 0.1], [-1e-6], [-1e-7]])
+def test_torque_is_exact_while_a_weight_bends_a_crank_that_its_rod_covers(offsets):
+    """Crank and rod are L long; the crank turns by 1 rad/s and is upright at π/2 s, where the rod lies on it
+    and the slider on the crank's hinge. The rod then holds a slider that gravity pulls along its guide by
+    forces that grow without limit, but the torque is finite: with the masses m of crank and rod and M of the
+    slider it is L² (2 m + 4 M) sin t cos t + g_x L (2 m + 2 M) sin t - g_y L m cos t. The rod turns evenly,
+    also where a run ends before π/2 s."""
+    scene = find_scene("planar_slider_crank_equal").with_(gravity=(-3.0, -G, 0.0), load=())
+    scene = scene.with_(driver=[{"joint": "A", "polynomial": [0.0, 1.0]}])
+    times = np.pi / 2 + np.array(offsets)
+    motion = simulate(scene, times=times)
+    length, m, slider = 0.308, scene.body[0].mass, scene.body[2].mass
+    sine, cosine = np.sin(times), np.cos(times)
+    exact = length**2 * (2 * m + 4 * slider) * sine * cosine
+    exact += -3.0 * length * (2 * m + 2 * slider) * sine + G * length * m * cosine
+    assert motion.outcome.name == "COMPLETED", motion.message
+    assert_equal(motion.driver("A").torque, exact, 1e-7)
+    assert np.abs(motion["rod"].angular_acceleration).max() < 1e-10
+    assert not motion.driver("A").open.any()
+
+
+def test_equilibrium_determines_no_torque_of_a_driver_at_a_singular_position():
+    """The rod of the slider-crank is as long as its crank and lies on it at 0.25 s alone."""
+    scene = find_scene("planar_slider_crank_equal").with_(gravity=(-3.0, -G, 0.0), load=())
+    scene = scene.with_(driver=[{"joint": "A", "polynomial": [0.0, 2 * np.pi]}])
+    driver = simulate(scene, times=[0.0, 0.24, 0.25, 0.26]).driver("A")
+    assert driver.open.tolist() == [0, 0, 1, 0]
