@@ -47,4 +47,4 @@ def found_readers(
 
 
 def _requirement(of_name: Loader, version: str) -> Requirement:
-    return Requirement(of_name.package, version or of_name.version)
+    return Requirement(of_name.package, version or of_name.version, tuple(of_name.beside))

@@ -36,10 +36,11 @@ class NotInstalled(Exception):
 
 
 class Requirement(NamedTuple):
-    """One version of a package."""
+    """One version of a package, and pip's requirements of further packages."""
 
     package: str
     version: str
+    beside: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         return f"{self.package}=={self.version}"
@@ -92,7 +93,7 @@ def unpacked(wanted: Requirement) -> Path:
 
 
 def _place(wanted: Requirement) -> Path:
-    origin = hashed(sys.prefix, sys.version, str(PRODUCT), *_pins())
+    origin = hashed(sys.prefix, sys.version, str(PRODUCT), *_pins(), *wanted.beside)
     return cache("versions") / f"{wanted.package}-{wanted.version}-{origin[:8]}"
 
 
@@ -107,7 +108,7 @@ def _fill(place: Path, wanted: Requirement, pins: Sequence[str]) -> None:
         shutil.copy(own, place)  # pip's settings of this environment
     constraints = place / "constraints.txt"
     constraints.write_text("\n".join(pins))
-    _pip("--python", _python(place), "install", "--constraint", constraints, str(wanted))
+    _pip("--python", _python(place), "install", "--constraint", constraints, *wanted.beside, str(wanted))
     (packages,) = place.glob("lib/python*/site-packages")
     here = [path for path in sys.path if Path(path).name in PACKAGES]
     # .pth files are read in the order of their names: packages' own ones come first

@@ -56,6 +56,7 @@ class Loader(ABC):
     version: str
     formats: Sequence[str]
     tolerance: float = DOUBLE
+    beside: Sequence[str] = ()  # further packages that it needs for some files, as pip's requirements
     convention: str = ""  # a choice that the format leaves open, in a sentence
 
     @abstractmethod

@@ -49,6 +49,7 @@ class Newton(Loader):
     name = "newton"
     package = "newton"
     version = "1.8.0"
+    beside = ("trimesh>=4.6.8",)  # meshes
     formats = (URDF, MJCF)
     tolerance = SINGLE
     convention = "its model builder; attributes for its solver on MuJoCo alone are not counted"
