@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from mbref.design.equilibrium import Equilibrium, equilibria, motion_of_mode
     from mbref.design.exchange import exchanges
     from mbref.design.idle_freedoms import idle_freedoms
+    from mbref.design.synthesis.result import SynthesisResult
+    from mbref.design.synthesis.synthesise import synthesise
     from mbref.ensembles.ensemble import ensemble
     from mbref.equations.counts import counts
     from mbref.equations.matrices import Matrices
@@ -56,6 +58,8 @@ _PUBLIC = {  # module → its public names
     "design.equilibrium": ("Equilibrium", "equilibria", "motion_of_mode"),
     "design.exchange": ("exchanges",),
     "design.idle_freedoms": ("idle_freedoms",),
+    "design.synthesis.result": ("SynthesisResult",),
+    "design.synthesis.synthesise": ("synthesise",),
     "ensembles.ensemble": ("ensemble",),
     "equations.counts": ("counts",),
     "equations.matrices": ("Matrices",),
@@ -98,6 +102,7 @@ __all__ = [
     "SceneError",
     "Sensitivities",
     "StateDerivatives",
+    "SynthesisResult",
     "Trajectory",
     "Variation",
     "along_motion",
@@ -121,6 +126,7 @@ __all__ = [
     "state_derivatives",
     "still",
     "sweep",
+    "synthesise",
     "terms",
     "variants",
     "with_error_estimate",

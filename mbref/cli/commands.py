@@ -18,6 +18,7 @@ from mbref.cli.run import add as add_run
 from mbref.cli.scene_files import add as add_scene_files
 from mbref.cli.sensitivities import add as add_sensitivities
 from mbref.cli.statics import add as add_statics
+from mbref.cli.synthesis import add as add_synthesis
 from mbref.cli.tables import add as add_tables
 from mbref.command_line import Parser, commands, status_of
 from mbref.method import MethodError
@@ -81,6 +82,7 @@ def parser() -> argparse.ArgumentParser:
         add_plotting,
         add_statics,
         add_sensitivities,
+        add_synthesis,
         add_ensemble,
         add_exchange,
         add_tables,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,29 +10,25 @@ from typing import Any
 import numpy as np
 
 from mbref.design.derivatives.columns import without_derivative
-from mbref.design.derivatives.numbers_of_scene import number_at
+from mbref.design.derivatives.free_numbers import FreeNumbers
+from mbref.design.derivatives.natural_units import natural_units
+from mbref.design.derivatives.numbers_of_scene import AccurateStencils
 from mbref.design.derivatives.result import with_none
 from mbref.design.derivatives.sensitivities import motion_and_derivatives, refuse_repeats
-from mbref.design.derivatives.start_numbers import is_of_start
-from mbref.equations.model import Model
-from mbref.equations.offsets import assembled
+from mbref.design.derivatives.tables import NumberTable, columns_of_numbers, refuse_not_finite
+from mbref.design.derivatives.undetermined import SingularDirections
 from mbref.input_error import InputError
-from mbref.motions.outputs import UNIT_OF, chosen, quantity_of
+from mbref.motions.outputs import chosen
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 from mbref.simulation.simulate import checked_times, simulate
 from mbref.stepping.limits import Limits
 
 FIT_RTOL = 1e-10  # relative tolerance of the runs; derivatives then have about eight digits
-# singular value of the scaled Jacobian / largest one, below which the columns do not determine a combination
-INDETERMINATE = 1e-6
 # change of all columns over their sizes if a number doubles, that is rounding of derivatives (1e-14)
 NO_INFLUENCE = 1e-10
 CONSTANT = 1e-8  # standard deviation of a column / its size that is an error of the runs (1e-10) or rounding
-PART_OF_COMBINATION = 1e-3  # weight of a number in such a unit combination from which it takes part
 FIT_TOLERANCE = 1e-12  # relative changes of the sum of squares and of the numbers that end the iteration
-NOT_NEGATIVE = ("mass", "stiffness", "damping", "natural_length", "armature")
-MOMENT = re.compile(r"\.inertia(\[\d\]|\.[xyz]|\[(\d)\]\[\2\])$")  # principal, or on the diagonal
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +47,8 @@ class FitResult:
     correlations : ndarray, shape (p, p)
         Correlations of the p numbers, in their order; NaN for undetermined ones.
     undetermined : tuple of dict of str to float
-        Combinations of relative changes of numbers, by path, that change no column.
+        Combinations of relative changes of numbers, of points in lengths of the mechanism, by path, that
+        change no column.
     deviations : dict of str to float
         Root mean square residual of each column, in its unit.
     converged : bool
@@ -90,7 +85,7 @@ class FitResult:
 
 def fit(
     scene: Scene | str | Path,
-    measured: Mapping[str, np.ndarray] | str | Path,
+    measured: NumberTable,
     free: Sequence[str],
     of: Sequence[str] | None = None,
     limits: Limits | None = None,
@@ -130,74 +125,34 @@ def fit(
     """
     from scipy.optimize import least_squares
 
-    scene, columns = find_scene(scene), _columns(measured)
+    scene = find_scene(scene)
     refuse_repeats(scene, "free", free)
-    times = checked_times(_finite({"time": columns.pop("time")})["time"])
+    times, columns = _timed(measured)
     motion = simulate(scene, times=times[:1])
     left_out = without_derivative(motion, [*columns]) if of is None else {}
     used = [name for name in columns if name not in left_out] if of is None else chosen(columns, of)
     if used != (whole := chosen(motion.columns(), used)):
         raise InputError(f"measured: name whole columns: {', '.join(whole)}")
-    measured = _finite({name: columns[name] for name in used})
-    problem = _Problem(scene, times, measured, free, limits or Limits(rtol=FIT_RTOL))
-    begin = problem.start / problem.sizes
-    lower = np.where([_is_not_negative(label) for label in free], 0.0, -np.inf)
+    refuse_not_finite(chosen_columns := {name: columns[name] for name in used}, "measured")
+    problem = _Problem(scene, times, chosen_columns, free, limits or Limits(rtol=FIT_RTOL))
+    begin, lowest = problem.numbers.start / problem.sizes, problem.numbers.lowest
     tolerances = {name: FIT_TOLERANCE for name in ("ftol", "xtol", "gtol")}
-    found = least_squares(problem.residuals, begin, problem.jacobian, bounds=(lower, np.inf), **tolerances)
+    found = least_squares(problem.residuals, begin, problem.jacobian, bounds=(lowest, np.inf), **tolerances)
     return replace(problem.solution(found.x, found.status > 0), left_out=(*left_out,))
 
 
-def _columns(measured: Mapping[str, np.ndarray] | str | Path) -> dict[str, np.ndarray]:
-    """Return measured columns (k,); raises InputError for a table that is not of numbers."""
-    if not isinstance(measured, Mapping):
-        with open(measured, encoding="utf-8-sig", newline="") as file:
-            names, *rows = [*csv.reader(file)] or [[]]
-        if uneven := [k for k, row in enumerate(rows, 1) if len(row) != len(names)]:
-            raise InputError(f"{measured}: row {uneven[0]} of the numbers needs {len(names)} of them")
-        try:
-            table = np.array(rows, dtype=float).reshape(len(rows), len(names))
-        except ValueError as fault:
-            raise InputError(f"{measured}: needs a line of names, and lines of numbers: {fault}") from None
-        for name in names:
-            if names.count(name) > 1:
-                raise InputError(f"{measured}: has the column {name!r} twice; remove one")
-        measured = dict(zip(names, table.T, strict=True))
-    found = {name: np.asarray(values, dtype=float) for name, values in measured.items()}
-    if named := next((name for name in found if name.endswith("]")), None):
-        raise InputError(f"measured: column {named!r} has a unit; give SI units, and names without units")
-    if "time" not in found or len(found) < 2 or len({values.shape for values in found.values()}) > 1:
+def _timed(measured: NumberTable) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return the times (k,) and columns (k,) of a table; raises InputError if either is missing."""
+    columns = columns_of_numbers(measured, "measured")
+    if "time" not in columns or len(columns) < 2:
         raise InputError("measured: needs time and one column at least, of equal lengths")
-    return found
-
-
-def _finite(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return columns (k,); raises InputError for the first number that is not finite."""
-    for name, values in columns.items():
-        for row in np.flatnonzero(~np.isfinite(values)):
-            raise InputError(f"measured: {name} is {values[row]} in row {row + 1} of the numbers")
-    return columns
-
-
-def _is_not_negative(label: str) -> bool:
-    return label.rpartition(".")[2] in NOT_NEGATIVE or MOMENT.search(label) is not None
+    refuse_not_finite({"time": columns["time"]}, "measured")
+    return checked_times(columns.pop("time")), columns
 
 
 def _column_sizes(scene: Scene, columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return the largest values (c,) of columns, or the units of the mechanism if these are larger: its
-    length, its mass and the scene's duration."""
-    length, time = Model(assembled(scene)).length, scene.duration
-    mass = sum(body.mass or 0.0 for body in scene.body)
-    force = mass * length / time**2
-    units = {"m": length, "s": time, "s²": time**2, "rad": 1.0, "N": force, "J": force * length}
-    units["W"] = units["J"] / time
-
-    def product(text: str) -> float:
-        return float(np.prod([units[unit] for unit in text.split()]))
-
-    parts = [UNIT_OF[quantity_of(name)].partition("/") for name in columns]
-    natural = np.array([product(over) / product(under) for over, _, under in parts])
-    sizes = np.maximum(natural, [np.abs(values).max() for values in columns.values()])
-    return np.where(sizes > 0.0, sizes, 1.0)
+    """Return the largest values (c,) of columns, or their natural units if these are larger."""
+    return np.maximum(natural_units(scene, [*columns]), [np.abs(values).max() for values in columns.values()])
 
 
 class _Problem:
@@ -211,15 +166,8 @@ class _Problem:
         free: Sequence[str],
         limits: Limits,
     ):
-        for label in free:
-            if is_of_start(label):
-                raise InputError(
-                    f"{label}: numbers of the start are no fields of the scene, and cannot be fitted"
-                )
-        self.scene, self.free, self.limits = scene, tuple(free), limits
-        self.times, self.measured = times, measured
-        self.start = np.array([number_at(scene, label) for label in free])
-        self.sizes = np.where(self.start == 0.0, 1.0, np.abs(self.start))
+        self.numbers, self.free, self.limits = FreeNumbers(scene, "free", free), tuple(free), limits
+        self.times, self.measured, self.sizes = times, measured, self.numbers.sizes
         if (count := times.size * len(measured)) <= len(free):
             raise InputError(
                 f"measured: has {count} numbers in columns with derivatives, and {len(free)} free ones "
@@ -228,24 +176,17 @@ class _Problem:
         spread = np.array([values.std() for values in measured.values()])
         self.column_sizes = _column_sizes(scene, measured)
         self.scales = np.where(spread > CONSTANT * self.column_sizes, spread, self.column_sizes)
+        self._accurate: AccurateStencils = {}
         self._last: tuple[bytes, np.ndarray, np.ndarray] | None = None
-
-    def scene_at(self, z: np.ndarray) -> Scene:
-        """Return the scene with numbers z (p,), over their sizes."""
-        scene = self.scene
-        for label, value in zip(self.free, (z * self.sizes).tolist(), strict=True):
-            scene = scene.with_(label, value)
-        return scene
 
     def _at(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the differences (k, c) of the motion's columns from the measured ones, and their derivatives
         (k, c, p)."""
         if self._last is None or self._last[0] != z.tobytes():
-            request = self.scene_at(z), list(self.measured), self.free, self.times, self.limits
-            motion, outputs, derivatives = motion_and_derivatives(*request)
+            request = self.numbers.scene_at(z), list(self.measured), self.free, self.times, self.limits
+            motion, outputs, derivatives = motion_and_derivatives(*request, self._accurate)
             if len(derivatives) < self.times.size:
-                numbers = zip(self.free, z * self.sizes, strict=True)
-                values = ", ".join(f"{name} = {x:.6g}" for name, x in numbers)
+                values = ", ".join(f"{name} = {x:.6g}" for name, x in self.numbers.values(z).items())
                 reason = motion.message or "it passes a singular position"
                 raise InputError(f"fit: the motion with {values} has no derivatives to the end: {reason}")
             table = motion.columns(*outputs)
@@ -265,29 +206,23 @@ class _Problem:
     def solution(self, z: np.ndarray, converged: bool) -> FitResult:
         """Return the fit with numbers z (p,), over their sizes."""
         residuals, off = self.residuals(z), self._at(z)[0]
-        _, values, right = np.linalg.svd(self.jacobian(z), full_matrices=False)
         influence = np.sqrt(self.times.size) * np.linalg.norm(self.column_sizes / self.scales)
-        known = values > max(INDETERMINATE * values.max(initial=0.0), NO_INFLUENCE * influence)
+        directions = SingularDirections.of(self.jacobian(z), NO_INFLUENCE * influence)
+        values, right, known = directions
+        undetermined = directions.undetermined(self.free)
         variance = residuals @ residuals / (residuals.size - known.sum())
         covariance = variance * (right[known].T / values[known] ** 2) @ right[known]
-        lost = (np.abs(right[~known]) > PART_OF_COMBINATION).any(axis=0)
+        lost = [any(name in combination for combination in undetermined) for name in self.free]
         deviation = np.where(lost, np.nan, np.sqrt(np.diag(covariance)))
         with np.errstate(invalid="ignore"):
             correlations = covariance / np.outer(deviation, deviation)
         errors = np.where(lost, np.inf, deviation * self.sizes)
         return FitResult(
-            scene=self.scene_at(z),
-            numbers=dict(zip(self.free, (z * self.sizes).tolist(), strict=True)),
+            scene=self.numbers.scene_at(z),
+            numbers=self.numbers.values(z),
             errors=dict(zip(self.free, errors.tolist(), strict=True)),
             correlations=correlations,
-            undetermined=tuple(
-                {
-                    name: x
-                    for name, x in zip(self.free, row.tolist(), strict=True)
-                    if abs(x) > PART_OF_COMBINATION
-                }
-                for row in right[~known]
-            ),
+            undetermined=undetermined,
             deviations=dict(zip(self.measured, np.sqrt((off**2).mean(axis=0)).tolist(), strict=True)),
             converged=converged,
         )

@@ -54,6 +54,9 @@ TERMS_ROUNDING = 50.0  # roundings of the largest term that the many operations 
 EPSILON = float(np.finfo(float).eps)
 
 
+AccurateStencils = dict[str, tuple[float, Stencil]]  # factors and stencils, by path
+
+
 class Variants(NamedTuple):
     """Scenes whose number at a path differs by a step times the offsets of a stencil, packed."""
 
@@ -85,7 +88,7 @@ class Variants(NamedTuple):
 def variants_of(scene: Scene, label: str, base: Model, step: float) -> Variants:
     """Return variants for differences of order 8, with the largest step up to one that leaves all scenes
     valid; central if possible. ``base`` and ``step`` are as of ``scene_number``."""
-    size = step * _size(number_at(scene, label), label, base)
+    size = step * size_of_number(number_at(scene, label), label, base)
     faults: list[SceneError] = []
     for factor, stencil in (*CENTRAL_STENCILS[1:], *ONE_SIDED_STENCILS):
         try:
@@ -135,17 +138,22 @@ def _terms_at(terms: Callable[..., Terms], places: Sequence[int], states: States
     return terms(np.asarray(places), *many)
 
 
-def scene_number(scene: Scene, label: str, base: Model, step: float) -> SceneNumber:
+def scene_number(
+    scene: Scene, label: str, base: Model, step: float, accurate: AccurateStencils | None = None
+) -> SceneNumber:
     """Return the number of a scene at a path such as ``body[rod].mass`` or ``joint[B].anchor.x``.
 
-    ``base`` is the model of the assembled scene, ``step`` the increment over the number's size. Raises
+    ``base`` is the model of the assembled scene, ``step`` the increment over the number's size. The stencil
+    of ``accurate`` is tried first, and the one that is accurate is kept there. Raises
     SceneError if the path has no number, or if no value near it makes a valid scene; InputError if the
     equations do not depend on it smoothly.
     """
-    size = step * _size(number_at(scene, label), label, base)
+    size = step * size_of_number(number_at(scene, label), label, base)
     found: list[SceneNumber] = []
     faults: list[SceneError] = []
-    for stencils in (CENTRAL_STENCILS, ONE_SIDED_STENCILS):
+    accurate = {} if accurate is None else accurate
+    before = (accurate[label],) if label in accurate else ()
+    for stencils in (before, CENTRAL_STENCILS, ONE_SIDED_STENCILS):
         for factor, stencil in stencils:
             try:
                 found.append(_differences(scene, label, factor * size, stencil, base))
@@ -153,9 +161,10 @@ def scene_number(scene: Scene, label: str, base: Model, step: float) -> SceneNum
                 faults.append(fault)
                 continue
             if found[-1].error <= ACCURATE:
+                accurate[label] = factor, stencil
                 return found[-1]
         best = min(found, key=lambda number: number.error, default=None)
-        if best is not None and best.error <= ROUGH:
+        if stencils is not before and best is not None and best.error <= ROUGH:
             return best
     if not found:
         raise faults[-1]
@@ -200,10 +209,10 @@ def _at(scene: Scene, path: str) -> Any:
     return found[0]
 
 
-def _size(value: float, path: str, base: Model) -> float:
+def size_of_number(value: float, path: str, base: Model) -> float:
     """Return the size of a number: its value or 1, and for points the length of the shortest spring or of the
     mechanism."""
-    if not re.search(r"anchor|point|position", path):
+    if not re.search(r"anchor|point|position", re.sub(r"\[[^\]]*\]", "", path)):
         return abs(value) or 1.0
     start = base.start()[None]
     return base.length * float(shortest_spring(base, start)[0])

@@ -14,6 +14,7 @@ import numpy as np
 from mbref.design.derivatives.columns import Columns, differentiable
 from mbref.design.derivatives.followed import Followed
 from mbref.design.derivatives.numbers_of_scene import (
+    AccurateStencils,
     SceneNumber,
     is_same_number,
     scene_number,
@@ -99,11 +100,17 @@ def sensitivities(
 
 
 def motion_and_derivatives(
-    scene: Scene, of: Sequence[str], to: Sequence[str], times: np.ndarray, limits: Limits
+    scene: Scene,
+    of: Sequence[str],
+    to: Sequence[str],
+    times: np.ndarray,
+    limits: Limits,
+    accurate: AccurateStencils | None = None,
 ) -> tuple[Motion, list[str], np.ndarray]:
     """Return the motion at times (k,), s, the outputs' names, and their derivatives (k, outputs, numbers) up
-    to a singular position, without an estimate of their errors. Raises the errors of ``sensitivities``."""
-    request = DerivativeRequest(scene, of, to, times)
+    to a singular position, without an estimate of their errors. ``accurate`` are stencils of numbers that are
+    tried first, see ``scene_number``. Raises the errors of ``sensitivities``."""
+    request = DerivativeRequest(scene, of, to, times, accurate)
     found, run = request.solved(request.method, limits, FIRST_PRECISION)
     request.model.release()
     return run.motion, found.outputs, found.values
@@ -152,7 +159,9 @@ class DerivativeRequest:
         of: Sequence[str] | None,
         labels: Sequence[str] | None,
         times: Sequence[float] | np.ndarray | None,
+        accurate: AccurateStencils | None = None,
     ):
+        self.accurate = accurate
         self.samples = checked_times(np.linspace(0.0, scene.duration, SAMPLES) if times is None else times)
         if self.samples[-1] > scene.duration:
             scene = scene.with_(duration=float(self.samples[-1]))
@@ -170,7 +179,8 @@ class DerivativeRequest:
     def numbers(self) -> list[SceneNumber]:
         """The numbers that are fields of the scene."""
         fields = [label for label in self.labels if not is_of_start(label)]
-        return [scene_number(self.scene, label, self.model, NUMBER_STEP) for label in fields]
+        rest = self.model, NUMBER_STEP, self.accurate
+        return [scene_number(self.scene, label, *rest) for label in fields]
 
     @cached_property
     def outputs(self) -> list[str]:

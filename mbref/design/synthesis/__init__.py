@@ -1,0 +1,1 @@
+"""Dimensional synthesis: numbers of a scene whose motion meets goals."""
