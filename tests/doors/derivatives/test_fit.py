@@ -6,6 +6,7 @@ import pytest
 import mbref
 from mbref.cli import main
 from tests.doors.derivatives.test_sensitivities import pendulum
+from tests.helpers.changed_scenes import in_other_units
 from tests.helpers.short_motions import MOTIONS
 
 NOISE = 1e-3  # rad, standard deviation of the errors of a measured angle
@@ -50,6 +51,18 @@ def test_constant_column_counts_no_more_than_others():
     columns = mbref.simulate(pendulum(), times=times).columns("A.angle")
     found = mbref.fit(wrong, {**columns, "bob.position.z": np.full(3, 0.1)}, ["body[bob].mass"])
     assert found.numbers["body[bob].mass"] == pytest.approx(1.3, rel=1e-6)
+
+
+def test_fit_of_a_tiny_pendulum_finds_its_pivot_and_gravity():
+    """Lengths of the pendulum and gravity are 1e-8 times as large in SI units, so that its angle is the same;
+    the fit begins with the pivot 1 % off, at zero, and with 10 % more gravity."""
+    tiny, times = in_other_units(pendulum(), mass=1.0, length=1e-8, time=1.0), np.array([0.1, 0.2, 0.3, 0.4])
+    true = {"joint[A].anchor.x": 5e-11, "gravity.y": -9.81e-8}
+    columns = mbref.simulate(tiny.with_("joint[A].anchor.x", 5e-11), times=times).columns("A.angle")
+    found = mbref.fit(tiny.with_("gravity.y", -1.08e-7), columns, list(true))
+    assert not found.undetermined
+    for number, value in true.items():
+        assert found.numbers[number] == pytest.approx(value, rel=1e-5)
 
 
 def test_table_with_units_in_its_names_is_refused_with_a_column(tmp_path):

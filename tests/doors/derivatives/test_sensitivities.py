@@ -67,6 +67,17 @@ def test_derivatives_of_a_pendulums_angle_equal_those_of_jacobis_function():
         assert (np.abs(found.values[:, 0, k] - true) <= MOST_ERRORS * found.errors[:, 0, k]).all()
 
 
+def test_number_of_a_body_that_is_called_point_is_no_coordinate_of_a_point():
+    """Steps of differences fit the inertia, 1e-6 kg m², not the length of the pendulum, 0.5 m."""
+    bob = body("point", 1.3, [1e-6] * 3, (0.3, -0.4, 0.0))
+    scene = pendulum().with_(body=[bob], joint=[hinge("A", "ground", "point", (0.0, 0.0, 0.0))])
+    numbers = {"mass": 1.3, "inertia": 1e-6, "x": 0.0, "y": 0.0, "gravity": -GRAVITY, "start": 0.0}
+    times = np.array([0.3, 1.7])
+    found = mbref.sensitivities(scene, ["A.angle"], ["body[point].inertia[2]"], times)
+    true = slope(lambda **n: angle_of_pendulum(times, **n), numbers, "inertia")
+    assert_close(found.values[:, 0, 0], true, 1e-9)
+
+
 SLIDER = slide("D", "ground", "last", (0.9, 0.5, 0.0))
 ROCKER = hinge("D", "ground", "last", (1.0, 0.0, 0.0))
 
