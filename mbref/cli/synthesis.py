@@ -30,18 +30,19 @@ def add(commands: Any) -> None:
         "design",
         action=_design,
         help="numbers of a scene whose motion follows points, or whose outputs are least",
-        description="Dimensional synthesis: changes numbers of a scene until its motion goes through given\n"
-        "points (--follow), or until outputs such as a driver's torque are least (--least). Derivatives are\n"
-        "exact, loops stay closed, and the search is repeated from several starts. Prints the numbers, the\n"
-        "residual at each point, active bounds, and combinations of numbers that have no effect.",
+        description="Dimensional synthesis: changes numbers of a scene until its motion goes through\n"
+        "given points (--follow), or until outputs such as a driver's torque are least (--least).\n"
+        "Derivatives are exact, loops stay closed, and the search is repeated from several starts.\n"
+        "Prints the numbers, the residual at each point, active bounds, and combinations of numbers\n"
+        "that have no effect.",
         epilog="points.csv has a line of columns (mbref list outputs) and a line for each point, SI units.\n"
-        "With a column time, points are reached at these times; without, in their order at any times up to\n"
-        "the duration. An empty cell gives no condition:\n"
+        "With a column time, points are reached at these times; without, in their order at any\n"
+        "times up to the duration. An empty cell gives no condition:\n"
         "  time,coupler.position.x,coupler.position.y\n"
         "  0.1,0.42,0.31\n"
         "  0.2,,0.33\n\n"
         "examples:\n"
-        "  mbref design my.toml --let joint[B].anchor.x --let 'body[coupler].position.y 0.1 0.5' \\\n"
+        "  mbref design my.toml --let 'joint[B].anchor.x' --let 'body[coupler].position.y 0.1 0.5' \\\n"
         "      --follow points.csv --out found.toml --plot found.svg\n"
         "  mbref design my.toml --let 'body[crank].position.x -0.3 0.3' --least 'driver(A).torque' --peak",
     )
@@ -162,7 +163,8 @@ def _show_points(found: SynthesisResult) -> None:
     """Print the residual at each point."""
     from rich.table import Table
 
-    table = Table(title=f"residuals, {len(found.times)} points")
+    count, shown = len(found.times), min(len(found.times), MOST_ROWS_SHOWN)
+    table = Table(title=f"residuals, {shown} of {count} points" if shown < count else "residuals")
     for title in ("point", "time, s", *found.columns):
         table.add_column(title, overflow="fold", justify="right")
     for k, (t, row) in enumerate(zip(found.times[:MOST_ROWS_SHOWN], found.residuals, strict=False), 1):
