@@ -56,14 +56,17 @@ def exact(scene: Scene, times: Sequence[float] | np.ndarray, seconds: float = SE
 
 
 def dense_exact(
-    scene: Scene, times: np.ndarray, seconds: float = SECONDS, wanted: Collection[str] | None = None
+    scene: Scene,
+    times: np.ndarray,
+    seconds: float = SECONDS,
+    wanted: Collection[str] | None = None,
+    dense: int = DENSE,
 ) -> tuple[Exact, dict[str, np.ndarray]]:
     """Return the exact motion at the times (k,) and at further times from 0 on, and its columns.
 
-    The further times are so dense that full turns of joints are counted, whatever the given times are.
-    ``wanted`` are the columns that are needed, by default all but reactions of joints.
+    The further times, at least ``dense``, are so dense that full turns of joints are counted, whatever the
+    given times are. ``wanted`` are the columns that are needed, by default all but reactions of joints.
     """
-    dense = DENSE
     while True:
         found = exact(scene, with_dense(times, dense), seconds)
         columns = values(scene, found.motion, wanted)

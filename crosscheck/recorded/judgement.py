@@ -15,13 +15,15 @@ from crosscheck.judge.start import started
 from crosscheck.judge.tolerances import FLOOR
 from crosscheck.recorded.column_errors import ColumnError, Columns, Compared, aligned
 from crosscheck.recorded.columns import kind_of, names, scales, start_columns
-from crosscheck.recorded.exact import Exact, dense_exact, uncounted
+from crosscheck.recorded.exact import DENSE, Exact, dense_exact, uncounted
 from crosscheck.recorded.explanations import Explanation, with_signs
 from crosscheck.recorded.reading import Recording, read
 from crosscheck.recorded.search import SECONDS as SEARCHED
 from crosscheck.recorded.search import Search, search
-from crosscheck.recorded.splines import splines
+from crosscheck.recorded.splines import Pieces, splines
 from mbref.scene import Scene, SceneError
+
+FINER = 8  # times as many further samples, if moved times leave errors: they may be of the splines
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,11 @@ def judge_motion(
     found, columns = dense_exact(scene, recording.times, seconds, recording.columns)
     if not (found.motion.times >= recording.times[0]).any():
         raise SceneError([f"{scene.name}: has no reference: {found.reason}"])
-    return _judged(scene, recording, found, columns, tolerance, progress)
+    compared, later = _compared(scene, recording, found, columns, tolerance)
+    if not compared.is_right and not np.isin(compared.times, recording.times).all():
+        found, columns = dense_exact(scene, recording.times, seconds, recording.columns, FINER * DENSE)
+        compared, later = _compared(scene, recording, found, columns, tolerance)
+    return _judged(scene, recording, found, (columns, compared, later), progress)
 
 
 def _as_recording(scene: Scene, motion: Any) -> Recording:
@@ -127,14 +133,10 @@ def _from_start(scene: Scene, recording: Recording) -> Recording:
     return replace(recording, columns=columns)
 
 
-def _judged(
-    scene: Scene,
-    recording: Recording,
-    found: Exact,
-    columns: Columns,
-    tolerance: float,
-    progress: Callable[[str], None] | None,
-) -> Judgement:
+def _compared(
+    scene: Scene, recording: Recording, found: Exact, columns: Columns, tolerance: float
+) -> tuple[Compared, dict[str, Pieces]]:
+    """Return the comparison of the columns that the judge can determine, and these as functions of time."""
     known = recording.times <= found.motion.times[-1]
     times = recording.times[known]
     places = np.searchsorted(found.motion.times, times)
@@ -159,13 +161,25 @@ def _judged(
     )
     if "time" in recording.rounding:
         compared = aligned(compared, recording.rounding["time"][known], later)
+    return compared, later
+
+
+def _judged(
+    scene: Scene,
+    recording: Recording,
+    found: Exact,
+    parts: tuple[Columns, Compared, dict[str, Pieces]],
+    progress: Callable[[str], None] | None,
+) -> Judgement:
+    columns, compared, later = parts
     errors, causes = compared.errors(), Search()
-    if any(e.largest > e.allowed for e in errors):
+    if not compared.is_right:
         if progress is not None:
             progress(f"searching for an explanation, at most {SEARCHED:g} CPU s")
         causes = search(scene, compared, later, float(found.motion.times[-1]))
-    left = tuple(n for n in recording.columns if n not in whole)
+    left = tuple(n for n in recording.columns if n not in compared.recorded)
     turning = tuple(n for n in uncounted(columns) if n in left)
-    until, searched = float(times[-1]), (causes.alike, causes.is_complete)
+    known = recording.times <= found.motion.times[-1]
+    until, searched = float(recording.times[known][-1]), (causes.alike, causes.is_complete)
     is_whole = bool(known.all())
     return Judgement(errors, causes.explanations, until, found.reason, left, turning, *searched, is_whole)

@@ -146,6 +146,26 @@ def test_times_that_are_rounded_are_compared_within_their_rounding(form: str, tm
     assert [column.name for column in found.columns if not column.is_right] == ["A.angle"]
 
 
+def test_times_of_few_digits_are_compared_within_their_rounding_of_large_angles(tmp_path: Path) -> None:
+    """The rod turns by 80 t rad, and half a unit of times with three decimals is 0.04 rad, over which the
+    motion is no parabola. Exact states are right; an error of 1e-6 m of one column is found. Two rows have
+    no spacing that would show exact times: t = 1/3 s may be written as 0.33, and 0.35 s may not."""
+    scene, path, times = spinning_rod(), tmp_path / "run.csv", np.random.default_rng(1).uniform(0, 1, 30)
+    rates = {"velocity": (0.0, 40.0, 0.0), "angular_velocity": (0.0, 0.0, 80.0)}
+    fast = [b.model_copy(update=rates) for b in scene.body]
+    angle = 80 * np.sort(times)
+    table = {"rod.x": np.cos(angle) / 2, "rod.y": np.sin(angle) / 2, "rod.qz": np.sin(angle / 2)}
+    for error, is_right in ((0.0, True), (1e-6, False)):
+        table["rod.y"] = table["rod.y"] + error * (np.arange(30) == 7)
+        rows = zip(angle / 80, *table.values(), strict=True)
+        written = [",".join([f"{t:.3f}", *(repr(float(x)) for x in numbers)]) for t, *numbers in rows]
+        path.write_text("\n".join([",".join(["time", *table]), *written]), encoding="utf-8")
+        assert crosscheck.judge_motion(scene.with_(body=fast), path).is_right is is_right
+    for time, is_right in ((1 / 3, True), (0.35, False)):
+        path.write_text(f"time,A.angle\n0.00,0.000000\n0.33,{16 * time:.6f}\n", encoding="utf-8")
+        assert crosscheck.judge_motion(scene, path).is_right is is_right
+
+
 def test_zero_among_numbers_with_an_exponent_is_exact(tmp_path: Path) -> None:
     """A small angle in the format of 1.234e-05 has four digits. Written as 0.000e+00 it is off: this cell is
     zero, and not a number below 5e-4 that is rounded to three decimals."""
