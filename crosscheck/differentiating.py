@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,10 @@ BodyMotion = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np
 Opening = Callable[[np.ndarray, np.ndarray], np.ndarray]  # (displacement, velocity) → rates (m,) of closures
 # (displacement, velocity, generalised force), each (nv,) → acceleration (nv,)
 OwnAccelerations = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+
+
+def _none(step: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    return np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -40,8 +44,9 @@ class OwnDerivatives:
     own : callable
         The function that is differentiated: of a displacement, velocities and generalised forces (nv,), the
         accelerations (nv,). It need not satisfy the constraints.
-    stand_ins : tuple of int
-        Coordinates of parts that the scene does not have, such as rods of distance joints.
+    spins : callable
+        Rates (k,) of parts that the scene does not have and that its bodies leave free, such as the spin of
+        rods of distance joints about their own axes; of a displacement and velocities (nv,).
     """
 
     coordinates: tuple[str, ...]
@@ -53,7 +58,7 @@ class OwnDerivatives:
     bodies: BodyMotion
     opening: Opening
     own: OwnAccelerations
-    stand_ins: tuple[int, ...] = ()
+    spins: Opening = _none
 
 
 @dataclass(frozen=True)
@@ -108,3 +113,24 @@ class Differentiating(ABC):
         OwnDerivatives or TangentDerivatives
             In the engine's coordinates, or along motions that the constraints allow.
         """
+
+    def own_number_derivatives(
+        self, scene: Scene, function: str, numbers: Sequence[str]
+    ) -> np.ndarray | None:
+        """Return the derivatives (6 nb, p) of the bodies' accelerations by numbers of the scene.
+
+        Parameters
+        ----------
+        scene : Scene
+            As of ``own_derivatives``.
+        function : str
+            A name in ``differentiates_by``.
+        numbers : sequence of str
+            Paths (p,) of masses and components of gravity, such as ``body[rod].mass``.
+
+        Returns
+        -------
+        ndarray or None
+            None, as of this method, if the function has no such derivatives.
+        """
+        return None

@@ -14,6 +14,7 @@ from crosscheck.cli.options import (
     add_reading,
     add_stored_runs,
 )
+from crosscheck.derivatives.records import FILE as DERIVATIVES
 from crosscheck.engines.loaders import PLACES
 from crosscheck.study.grid import MOST_SECONDS
 from mbref.command_line import add_output, number, output_folder, whole
@@ -62,19 +63,21 @@ def add_derivatives(commands: Commands) -> None:
         "with open loops: an engine that differentiates its own step or soft constraints can be right there, "
         "and wrong about the exact motion. An error up to 1e-6 of the largest derivative is right, up to "
         "1e-2 rough. Loads are left out, and drivers refused. A sentence says whether an error depends on "
-        "open loops, on velocities, or on neither. Exit status: 1 if a derivative is wrong"
+        "open loops, on velocities, or on neither. Without ENGINE and SCENE the stored results are shown; "
+        "--run measures engines and stores them. Exit status: 1 if a derivative of a named engine or scene "
+        "is wrong"
     )
     example = (
-        "crosscheck derivatives pinocchio\n  crosscheck derivatives my.toml --engine mujoco --json\n"
-        "  crosscheck derivatives my_module:ENGINE"
+        "crosscheck derivatives\n  crosscheck derivatives pinocchio fast_four_bar\n"
+        "  crosscheck derivatives my.toml --engine mujoco --json\n  crosscheck derivatives my_module:ENGINE"
     )
     parser = add_command(commands, "derivatives", about, example)
     about = (
-        "engines, and scenes: built-in names, .toml, MJCF, URDF or SDF files; default: all engines that have "
-        "such functions, and mechanisms with point closures, welds and redundant rows"
+        "engines, and scenes: built-in names, .toml, MJCF, URDF or SDF files, or mechanisms of the stored "
+        "results; default: all engines that have such functions, and these mechanisms"
     )
     parser.add_argument("what", nargs="*", metavar="ENGINE|SCENE", help=about)
-    add_engines(parser)
+    add_stored_runs(parser, DERIVATIVES)
     parser.add_argument("--json", action="store_true", help="print one JSON document and nothing else")
 
 

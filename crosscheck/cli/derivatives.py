@@ -4,72 +4,85 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from pathlib import Path
 
 from rich.box import SIMPLE
-from rich.table import Table
+from rich.table import Table as Shown
 
 from crosscheck.cli import request
+from crosscheck.cli.rendering import write_page
 from crosscheck.cli.running import COMPLETED, OTHERWISE, console, notice, print_json
 from crosscheck.cli.scene_request import find_scenes
-from crosscheck.derivatives import compare, sentences
-from crosscheck.derivatives.mechanisms import mechanisms
+from crosscheck.derivatives import compare, records, sentences, table
+from crosscheck.derivatives.mechanisms import MECHANISMS
 from crosscheck.differentiating import Differentiating
 from crosscheck.engine import all_engines, engine, engine_names
-from crosscheck.judge.state_derivatives import NotSmooth
-from crosscheck.processes import pool
-from crosscheck.processes.child import ChildFailed
 from mbref.scene import Scene
 
 Refusals = list[dict[str, str]]
-SECONDS = 300.0  # of CPU time of an engine on a scene
 
 
 def derivatives(arguments: argparse.Namespace) -> int:
-    """Compare engines on scenes; return 1 if a derivative is wrong or nothing was compared."""
+    """Compare engines on scenes, or show stored records; return 1 if a derivative that was compared is wrong
+    or nothing was compared."""
+    if not arguments.what and (arguments.run or not arguments.engine):
+        return _stored(arguments)
+    if arguments.run or arguments.page:
+        raise request.RequestError("--run and --page: serve the stored mechanisms, without ENGINE and SCENE")
     known = engine_names()
     names = [what for what in arguments.what if what in known or ":" in what]
-    paths = [what for what in arguments.what if what not in names]
-    scenes = find_scenes(paths, notice=notice) if paths else mechanisms()
+    scenes = _scenes([what for what in arguments.what if what not in names])
     asked = [*names, *(arguments.engine or ())]
     engines = request.find_engines(asked, notice) if asked else _differentiating()
     found: list[compare.Row] = []
     refused: Refusals = []
     for name in engines:
         for scene in scenes:
-            _compare(name, scene, found, refused)
-    if arguments.json:
-        print_json([{"rows": [_record(row) for row in found], "refused": refused}])
-    else:
-        _show(found, refused)
+            notice(f"{name}: {scene.name}")
+            rows, cannot = records.compared(name, scene)
+            found += rows
+            if cannot:
+                refused.append({"engine": name, "scene": scene.name, "reason": str(cannot)})
+    _print(arguments, found, refused)
     wrong = any(row.grade == compare.WRONG for row in found)
     return OTHERWISE if wrong or not found else COMPLETED
+
+
+def _scenes(paths: Sequence[str]) -> list[Scene]:
+    """Return mechanisms by their names, and other scenes; without paths all mechanisms."""
+    own = {mechanism.name: mechanism for mechanism in MECHANISMS}
+    others = find_scenes([path for path in paths if path not in own], notice=notice)
+    named = [mechanism.make() for name, mechanism in own.items() if name in paths or not paths]
+    return [*named, *others]
+
+
+def _stored(arguments: argparse.Namespace) -> int:
+    """Measure engines and write the page if requested, and print the stored records."""
+    path = Path(arguments.records)
+    if arguments.run:
+        records.measure(request.find_engines(arguments.engine or ["all"], notice), path, report=notice)
+    if status := write_page("derivatives", path, arguments.page):
+        return status
+    if not (stored := table.ordered(records.read(path))):
+        raise request.RequestError(f"{path}: has no records; --run measures engines and writes them")
+    refused = [
+        {"engine": r["engine"], "scene": r["scene"], "reason": f"{r['reason']} ({r['owner']})"}
+        for r in stored
+        if r["reason"]
+    ]
+    _print(arguments, [row for record in stored for row in records.rows_of(record)], refused)
+    return COMPLETED
 
 
 def _differentiating() -> list[str]:
     return [name for name in all_engines() if isinstance(engine(name), Differentiating)]
 
 
-def _compare(name: str, scene: Scene, found: list[compare.Row], refused: Refusals) -> None:
-    """Add the rows of an engine on a scene, or the reason why there are none."""
-    notice(f"{name}: {scene.name}")
-    try:
-        rows, reason = pool.apart(_of_engine, (name, scene), SECONDS)
-    except ChildFailed as failure:
-        rows, reason = [], str(failure)
-    found += rows
-    if reason:
-        refused.append({"engine": name, "scene": scene.name, "reason": reason})
-
-
-def _of_engine(name: str, scene: Scene) -> tuple[list[compare.Row], str]:
-    """Return an engine's rows, or the reason why there are none; called in a child."""
-    asked = engine(name)
-    if (refusal := compare.refusal(asked, scene)) is not None:
-        return [], str(refusal)
-    try:
-        return [*compare.rows(asked, scene)], ""
-    except NotSmooth as why:
-        return [], str(why)
+def _print(arguments: argparse.Namespace, found: Sequence[compare.Row], refused: Refusals) -> None:
+    if arguments.json:
+        print_json([{"rows": [_record(row) for row in found], "refused": refused}])
+    else:
+        _show(found, refused)
 
 
 def _record(row: compare.Row) -> dict[str, object]:
@@ -80,15 +93,15 @@ def _show(found: Sequence[compare.Row], refused: Refusals) -> None:
     out = console()
     if found:
         headings = ("engine", "function", "scene", "state", "against", *compare.BLOCKS)
-        table = Table(*headings, title="relative errors of derivatives of accelerations", box=SIMPLE)
+        shown = Shown(*headings, title="relative errors of derivatives of accelerations", box=SIMPLE)
         cells: dict[tuple[str, ...], dict[str, str]] = {}
         for row in found:
             key = (row.engine, row.function, row.scene, row.state, row.truth)
             cells.setdefault(key, {})[row.by] = f"{row.error:.0e} {row.grade}"
         for names, by in cells.items():
-            table.add_row(*names, *(by.get(block, "–") for block in compare.BLOCKS))
-        out.print(table)
+            shown.add_row(*names, *(by.get(block, "–") for block in compare.BLOCKS))
+        out.print(shown)
     for sentence in sentences.of_rows(found):
-        out.print(sentence, soft_wrap=True)
+        out.print(sentence.replace("`", ""), soft_wrap=True)
     for each in refused:
         out.print(f"{each['engine']}, {each['scene']}: refused: {each['reason']}", soft_wrap=True)

@@ -15,16 +15,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from crosscheck.derivatives.without import reason
 from crosscheck.differentiating import Differentiating, OwnDerivatives, TangentDerivatives
 from crosscheck.engine import Cannot, Engine, Owner
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.small_motions.equations import CENTRAL
-from crosscheck.judge.state_derivatives import StateDerivatives, bounded_derivatives
+from crosscheck.judge.state_derivatives import StateDerivatives, bounded_derivatives, number_at
 from mbref.scene import Scene, intermittent
 
 MOVING, AT_REST, OPEN = "moving", "at rest", "open loops"
 JUDGE, OWN = "judge", "own differences"
-BLOCKS = POSITION, VELOCITY, FORCE = "position", "velocity", "force"
+BLOCKS = POSITION, VELOCITY, FORCE, NUMBER = "position", "velocity", "force", "number"
 RIGHT, ROUGH, WRONG, UNDECIDED = "right", "rough", "wrong", "undecided"
 MOST = {RIGHT: 1e-6, ROUGH: 1e-2, WRONG: np.inf}  # relative error of derivatives of a grade
 SAFETY = 3.0  # factor on the uncertainty of the truth, below which an error proves nothing
@@ -34,7 +35,6 @@ STEPS = (2e-3, 2e-4, 2e-5, 2e-6)
 # rad/s, or lengths of the mechanism over s: step of differences by velocities, which are quadratic
 FAST = 1.0
 OPENED = 0.02  # displacement, rad or lengths, that opens loops
-UNMOVED = 1e-3  # weight of rates of stand-ins, whose spin the bodies leave open
 SAME = 1e-8  # part of the twists that an engine's coordinates may miss
 Source = tuple[str, str, str, str, str]  # engine, version, function, scene, state of a Row
 STILL = {"velocity": None, "angular_velocity": None}
@@ -67,9 +67,7 @@ class Row:
 def refusal(engine: Engine, scene: Scene) -> Cannot | None:
     """Return the reason why an engine's derivatives are not compared on a scene, if there is one."""
     if not isinstance(engine, Differentiating):
-        return Cannot(
-            Owner.ADAPTER, f"{engine.name} declares no function for derivatives (differentiates_by)"
-        )
+        return reason(engine.name)
     if scene.driver or any(intermittent(scene)):
         return Cannot(Owner.ADAPTER, "derivatives are compared without drivers, intervals and end stops")
     return engine.cannot(scene)
@@ -81,10 +79,10 @@ def rows(engine: Engine, scene: Scene) -> Iterator[Row]:
     Raises NotSmooth at a singular position.
     """
     assert isinstance(engine, Differentiating)
-    bare = scene.with_(load=[])
+    bare, numbers = scene.with_(load=[]), numbers_of(scene)
     still = bare.with_(body=[body.model_copy(update=STILL) for body in bare.body])
-    states = {AT_REST: (still, bounded_derivatives(still).values)}
-    true = bounded_derivatives(bare).values
+    states = {AT_REST: (still, bounded_derivatives(still, numbers).values)}
+    true = bounded_derivatives(bare, numbers).values
     if np.abs(true.by_velocity).max(initial=0.0) > 0.0 and any(
         b.velocity or b.angular_velocity for b in scene.body
     ):
@@ -94,9 +92,21 @@ def rows(engine: Engine, scene: Scene) -> Iterator[Row]:
         source = (engine.name, engine.version(), function, bare.name)
         for state, (at, judged) in states.items():
             yield from _at(found[state], (*source, state), at, judged)
+            by_number = engine.own_number_derivatives(at, function, numbers)
+            if by_number is not None:
+                sizes = np.array([abs(number_at(at, number)) for number in numbers])
+                least = float(np.abs(judged.by_position).max(initial=0.0))
+                error, worst, _ = _error(by_number * sizes, judged.by_number * sizes, _components(at), least)
+                yield Row(*source, state, JUDGE, NUMBER, error, worst)
         first = next(iter(states))
         if isinstance(own := found[first], OwnDerivatives):
             yield from _open(engine, own, (*source, OPEN), states[first][0])
+
+
+def numbers_of(scene: Scene) -> list[str]:
+    """Return paths of the numbers by which derivatives are compared: masses, and gravity that is not zero."""
+    pulls = [f"gravity.{axis}" for axis, value in zip("xyz", scene.gravity, strict=True) if value]
+    return [*(f"body[{body.name}].mass" for body in scene.body if body.mass), *pulls]
 
 
 def _at(
@@ -187,14 +197,15 @@ def along_constraints(found: OwnDerivatives, judged: StateDerivatives, scene: Sc
     """
     nothing, v, a = 0 * found.velocity, found.velocity, found.acceleration
     sizes, twists = _sizes(found, scene), _twists(found)
-    sizes[[*found.stand_ins]] *= UNMOVED
-    closing = np.array([found.opening(nothing, e) for e in np.eye(len(v))]).T
+    closing, spinning = (
+        np.array([f(nothing, e) for e in np.eye(len(v))]).T for f in (found.opening, found.spins)
+    )
     # largest rate of a closure is one, so that engines may scale their rows
     largest = np.abs(closing).max(initial=0.0) or 1.0
-    whole = np.concatenate([twists, closing / largest])
+    whole = np.concatenate([twists, closing / largest, spinning])
 
-    def solved(twist: np.ndarray, opening: np.ndarray) -> np.ndarray:
-        wanted = np.concatenate([twist, opening / largest])
+    def solved(twist: np.ndarray, opening: np.ndarray, spin: np.ndarray) -> np.ndarray:
+        wanted = np.concatenate([twist, opening / largest, spin])
         rates = np.linalg.lstsq(whole * sizes, wanted, rcond=SAME)[0] * sizes
         if np.abs(whole @ rates - wanted).max(initial=0.0) > SAME * np.abs(wanted).max(initial=1.0):
             raise ValueError(f"{scene.name}: the engine's coordinates do not move as the joints allow")
@@ -210,12 +221,14 @@ def along_constraints(found: OwnDerivatives, judged: StateDerivatives, scene: Sc
             derivative(lambda s: np.array(found.bodies(s[0], v + s[1], a)), h * np.array([place, rate])) / h
         )
 
-    moves = np.array([solved(twist, 0 * closing[:, 0]) for twist in judged.basis.T]).reshape(-1, len(v)).T
+    still = 0 * closing[:, 0], 0 * spinning[:, 0]
+    moves = np.array([solved(twist, *still) for twist in judged.basis.T]).reshape(-1, len(v)).T
     columns = []
     for place, carried in zip(moves.T, judged.carried.T, strict=True):
         turned, h = kinematics(place, nothing)[0], step(place)
         opened = derivative(lambda x: found.opening(x, v), h * place) / h
-        rate = solved(carried - turned, -opened)
+        spun = derivative(lambda x: found.spins(x, v), h * place) / h
+        rate = solved(carried - turned, -opened, -spun)
         own = found.by_position @ place + found.by_velocity @ rate
         columns.append(kinematics(place, rate)[1] + twists @ own)
     rated = [kinematics(nothing, rate)[1] + twists @ (found.by_velocity @ rate) for rate in moves.T]

@@ -16,7 +16,7 @@ CAUSES = {
 
 
 def of_rows(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield a sentence for each function and scene on which derivatives are wrong."""
+    """Yield a sentence for each function and scene on which derivatives are wrong, with `code` of names."""
     for (engine, function, scene), group in itertools.groupby(
         rows, lambda r: (r.engine, r.function, r.scene)
     ):
@@ -25,7 +25,7 @@ def of_rows(rows: Sequence[Row]) -> Iterator[str]:
             worst = max(wrong, key=lambda row: row.error)
             blocks = ", ".join(dict.fromkeys(row.by for row in wrong))
             where = f"{engine}, {function}, {scene}: wrong by {worst.error:.1e}"
-            yield f"{where} to {blocks}, most in {worst.worst}; {CAUSES[cause(found)]}"
+            yield f"{where} to {blocks}, most in `{worst.worst}`; {CAUSES[cause(found)]}"
 
 
 def cause(rows: Sequence[Row]) -> str:

@@ -104,6 +104,11 @@ class Mbref(Differentiating, Engine):
         found = state_derivatives(scene)
         return TangentDerivatives(found.basis, found.by_position, found.by_velocity, found.by_force)
 
+    def own_number_derivatives(self, scene: Scene, function: str, numbers: Sequence[str]) -> np.ndarray:
+        from mbref.design.derivatives.at_state import state_derivatives
+
+        return np.asarray(state_derivatives(scene, to=list(numbers)).by_number)
+
     def refuses(self, scene: Scene) -> Cannot | None:
         from mbref.equations.counts import undriven_freedoms
 

@@ -16,8 +16,8 @@ from mbref.files import write
 from ..markdown import body
 
 NAMES = (
-    *("which-engine", "closed-loops", "convergence", "invariants", "alternatives", "small-motions", "files"),
-    "real-files",
+    *("which-engine", "closed-loops", "convergence", "invariants", "alternatives", "small-motions"),
+    *("derivatives", "files", "real-files"),
     *("findings", "support", "thresholds"),
 )
 TEMPLATES = Path(__file__).parents[1] / "templates"  # texts of the pages, with names of parts in braces

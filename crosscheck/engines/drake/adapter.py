@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from crosscheck.engine import Alternatives, Setting
+from crosscheck.engines.drake import derivatives
 from crosscheck.engines.drake.model import Mechanism
 from crosscheck.engines.shared import terms
 from crosscheck.engines.shared.everything import EVERYTHING
@@ -36,7 +37,7 @@ WAYS = {name: Setting(DISCRETE, {"step": 1e-3, "contact": name}) for name in CON
 OWN_STEPS: dict[str, dict[str, float]] = {DISCRETE: {}}
 
 
-class Drake(SteppingEngine):
+class Drake(derivatives.Differentiated, SteppingEngine):
     """Drake (PyPI ``drake``)."""
 
     name = "drake"

@@ -11,7 +11,7 @@ from crosscheck.differentiating import Differentiating, OwnDerivatives
 from crosscheck.engines.mujoco.linearised import HARDEST, INCREMENT, STEP, STIFFEST
 from crosscheck.engines.mujoco.model import compiled
 from crosscheck.engines.mujoco.warnings_off import without_warnings
-from crosscheck.engines.shared.rates import names_of_rates, rates_of_rods
+from crosscheck.engines.shared.rates import names_of_rates, spins_of_rods
 from mbref.scene import Scene
 
 DEFAULTS, HARD = "defaults", "hard"
@@ -42,7 +42,7 @@ class Differentiated(Differentiating):
             bodies=lambda step, rate, change: model.bodies(at + step, rate, change),
             opening=lambda step, rate: model.opening(at + step, rate),
             own=lambda step, rate, force: model.accelerations(at, step, rate, force),
-            stand_ins=rates_of_rods(model.made.tree),
+            spins=lambda step, rate: model.spins(at + step, rate),
         )
 
 
@@ -106,3 +106,20 @@ class _Differentiated:
             rates.append(jacobian @ v)
             changes.append(jacobian @ a + change @ v)
         return np.concatenate(rates), np.concatenate(changes)
+
+    def spins(self, step: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Return the rates at which rods spin about their own axes."""
+        now, first = (self._turning(place, v) for place in (step, 0 * step))
+        return spins_of_rods(self.made.tree, now, first)
+
+    def _turning(self, step: np.ndarray, v: np.ndarray) -> Any:
+        """Return the function of a link that gives its rotation and angular velocity."""
+        data = self.at([step], v)
+        self.mujoco.mj_fwdPosition(self.model, data)
+
+        def turning(link: int) -> tuple[np.ndarray, np.ndarray]:
+            body, (linear, angular) = self.made.links[link], np.zeros((2, 3, self.nv))
+            self.mujoco.mj_jac(self.model, data, linear, angular, data.xpos[body], body)
+            return data.xmat[body].reshape(3, 3), angular @ v
+
+        return turning

@@ -9,7 +9,7 @@ import numpy as np
 
 from crosscheck.differentiating import Differentiating, OwnDerivatives
 from crosscheck.engines.pinocchio.model import Mechanism
-from crosscheck.engines.shared.rates import names_of_rates, rates_of_rods
+from crosscheck.engines.shared.rates import names_of_rates, spins_of_rods
 from mbref.scene import Scene
 
 FRAMES = ("LOCAL", "LOCAL_WORLD_ALIGNED")  # reference frames of closures
@@ -43,7 +43,7 @@ class Differentiated(Differentiating):
             bodies=lambda step, rate, change: model.bodies(at + step, rate, change),
             opening=lambda step, rate: model.opening(at + step, rate),
             own=lambda step, rate, force: model.solved(at, rate, force, step, derive=False)[0],
-            stand_ins=rates_of_rods(model.mechanism.tree),
+            spins=lambda step, rate: model.spins(at + step, rate),
         )
 
 
@@ -106,3 +106,21 @@ class _Differentiated:
         rates = [pin.getFrameVelocity(model, data, *place, frame).vector for place in places]
         changes = [pin.getFrameClassicalAcceleration(model, data, *place, frame).vector for place in places]
         return np.concatenate(rates), np.concatenate(changes)
+
+    def spins(self, step: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Return the rates at which rods spin about their own axes."""
+        now, first = (self._turning(place, v) for place in (step, 0 * step))
+        return spins_of_rods(self.mechanism.tree, now, first)
+
+    def _turning(self, step: np.ndarray, v: np.ndarray) -> Any:
+        """Return the function of a link that gives its rotation and angular velocity."""
+        pin, model, data = self.pin, self.model, self.model.createData()
+        pin.forwardKinematics(model, data, pin.integrate(model, self.mechanism.q0, step), v)
+        joints = [self.mechanism.frame(link)[0] for link in range(len(self.mechanism.tree.links))]
+        frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+        def turning(link: int) -> tuple[np.ndarray, np.ndarray]:
+            joint = joints[link]
+            return data.oMi[joint].rotation, pin.getVelocity(model, data, joint, frame).angular
+
+        return turning

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+import numpy as np
+
 from crosscheck.engines.shared.spanning_tree import Tree
+from mbref.rotations import unit
 from mbref.scene import Scene
+
+Turning = tuple[np.ndarray, np.ndarray]
 
 
 def names_of_rates(scene: Scene, tree: Tree) -> tuple[str, ...]:
@@ -15,7 +22,15 @@ def names_of_rates(scene: Scene, tree: Tree) -> tuple[str, ...]:
     return tuple(found)
 
 
-def rates_of_rods(tree: Tree) -> tuple[int, ...]:
-    """Return the indices of the joint velocities that carry rods of distance joints."""
-    rods = [k for k, link in enumerate(tree.links) if link.ends]
-    return tuple(tree.starts[k] + i for k in rods for i in range(tree.links[k].freedoms))
+def spins_of_rods(tree: Tree, now: Callable[[int], Turning], first: Callable[[int], Turning]) -> np.ndarray:
+    """Return the rates (k,) at which rods of distance joints spin about their own axes.
+
+    ``now`` and ``first`` give a link's rotation matrix and angular velocity (world), now and at t = 0.
+    """
+    found = []
+    for k, link in enumerate(tree.links):
+        if link.ends:
+            (_, one), (_, other) = link.ends
+            rotation, spin = now(k)
+            found.append(float(spin @ rotation @ first(k)[0].T @ unit(other - one)))
+    return np.array(found)
