@@ -99,7 +99,7 @@ def _shown(engine: str, row: Row | None) -> Cell:
 
 
 def _blocks(functions: dict[table.Name, table.Function]) -> HeatMap:
-    rows = {}
+    rows: dict[str, list[Cell]] = {}
     for name, of in functions.items():
         true = [row for rows in of.values() if isinstance(rows, list) for row in table.by_judge(rows)]
         rows[_name(*name)] = [

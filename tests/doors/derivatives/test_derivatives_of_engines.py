@@ -2,44 +2,89 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from crosscheck.cli import main
+from crosscheck.derivatives import compare, sentences
+from crosscheck.derivatives.mechanisms import MECHANISMS
+from crosscheck.derivatives.records import read
 from crosscheck.engine import installed
+from mbref.records import rewrite
 from mbref.scene import Scene
+from tests.zoo.gradients import ENGINES
 
 ZOO = "tests.zoo.gradients"
+MOVES, RESTS, OPENS = "only in motion", "also at rest", "off the constraints"
 FOUND = {  # engine of the zoo: words of the sentence on the cause
     "NONE": "",
-    "VELOCITY_SIGN": "only in motion",
-    "CONSTANT_JACOBIAN": "also at rest",
-    "UNSTABILISED": "off the constraints",
-    "QUATERNION": "also at rest",
+    "VELOCITY_SIGN": MOVES,
+    "NO_VELOCITY_TERMS": MOVES,
+    "HALF_VELOCITY_TERMS": MOVES,
+    "CONSTANT_JACOBIAN": RESTS,
+    "FORCE_SIGN": RESTS,
+    "CONSTANT_ROWS": RESTS,
+    "CONSTANT_MULTIPLIERS": RESTS,
+    "UNSTABILISED": OPENS,
+    "QUATERNION": RESTS,
+    "FREE_BODIES": RESTS,
+    "TRANSPOSED": RESTS,
 }
+WHIRLING = {"CONSTANT_INERTIA": RESTS, "NO_GYROSCOPIC": MOVES}  # shown by a body with turning principal axes
 
 
-@pytest.fixture
-def loop(tmp_path) -> str:
-    """Return the path of a moving body that turns and slides on a pin while a link of constant length holds
-    it: a loop of one freedom, with independent rows."""
+def pinned() -> Scene:
+    """Return a moving body that turns and slides on a pin while a link of constant length holds it: a loop of
+    one freedom, with independent rows."""
     place = {"position": [0.4, 0.2, 0.1], "angular_velocity": [0.0, 0.0, 3.0]}
     pin = {"name": "pin", "type": "cylindrical", "bodies": ["ground", "b"], "anchor": [0.0, 0.0, 0.0]}
     link = {"name": "link", "type": "distance", "bodies": ["ground", "b"]}
     joints = [{**pin, "axis": [0.0, 0.0, 1.0]}, {**link, "anchors": [[0.7, -0.3, 0.6], [0.5, 0.4, 0.2]]}]
     bodies = [{"name": "b", "mass": 1.3, "inertia": [0.02, 0.03, 0.04], **place}]
-    scene = Scene(name="pin", gravity=(0.0, -3.0, -9.0), duration=1.0, body=bodies, joint=joints)
-    scene.save(tmp_path / "loop.toml")
+    return Scene(name="pin", gravity=(0.0, -3.0, -9.0), duration=1.0, body=bodies, joint=joints)
+
+
+def whirling() -> Scene:
+    """Return a body that turns about a ball joint while a link of constant length to the point P holds its
+    point Q. Its angular velocity, Q + P, is perpendicular to Q × P, so that the link keeps its length."""
+    p, q = np.array([0.7, -0.3, 0.6]), np.array([0.5, 0.4, 0.2])
+    ball = {"name": "ball", "type": "spherical", "bodies": ["ground", "b"], "anchor": [0.0, 0.0, 0.0]}
+    link = {
+        "name": "link",
+        "type": "distance",
+        "bodies": ["ground", "b"],
+        "anchors": [p.tolist(), q.tolist()],
+    }
+    place = {"position": [0.4, 0.2, 0.1], "angular_velocity": (q + p).tolist()}
+    bodies = [{"name": "b", "mass": 1.3, "inertia": [0.2, 0.3, 0.4], **place}]
+    return Scene(name="whirl", gravity=(0.0, -3.0, -9.0), duration=1.0, body=bodies, joint=[ball, link])
+
+
+@pytest.fixture
+def loop(tmp_path) -> str:
+    """Return the path of a loop."""
+    pinned().save(tmp_path / "loop.toml")
     return str(tmp_path / "loop.toml")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "words"), FOUND.items(), ids=FOUND)
-def test_each_faulty_gradient_of_the_zoo_is_found_with_its_cause(loop, name, words, capsys):
-    status = main(["derivatives", f"{ZOO}:{name}", loop])
+@pytest.mark.parametrize(
+    ("name", "scene", "words"),
+    [*((n, pinned(), w) for n, w in FOUND.items()), *((n, whirling(), w) for n, w in WHIRLING.items())],
+    ids=[*FOUND, *WHIRLING],
+)
+def test_each_faulty_gradient_of_the_zoo_is_found_with_its_cause(name, scene, words):
+    said = [*sentences.of_rows([*compare.rows(ENGINES[name], scene)])]
+    assert len(said) == bool(words)
+    assert all("wrong by" in sentence and words in sentence for sentence in said)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "words"), [("NONE", ""), ("VELOCITY_SIGN", MOVES)])
+def test_command_fails_if_a_derivative_is_wrong_and_says_on_what_it_depends(loop, name, words, capsys):
+    assert main(["derivatives", f"{ZOO}:{name}", loop]) == bool(words)
     printed = capsys.readouterr().out
-    assert status == (1 if words else 0)
-    assert words in printed
-    assert ("wrong by" in printed) == bool(words)
+    assert ("wrong by" in printed) == bool(words) and words in printed
 
 
 def test_mbref_is_right_and_engines_without_derivatives_are_refused_with_the_owner(loop, capsys):
@@ -47,9 +92,39 @@ def test_mbref_is_right_and_engines_without_derivatives_are_refused_with_the_own
     found = json.loads(capsys.readouterr().out)
     assert {row["grade"] for row in found["rows"]} == {"right"}
     assert max(row["error"] for row in found["rows"]) <= 1e-11
-    assert {row["by"] for row in found["rows"]} == {"position", "velocity", "force"}
+    assert {row["by"] for row in found["rows"]} == {"position", "velocity", "force", "number"}
     (refused,) = found["refused"]
-    assert "exudyn" in refused["engine"] and "missing in the adapter" in refused["reason"]
+    assert "exudyn" in refused["engine"] and "missing in the engine" in refused["reason"]
+
+
+def test_stored_results_are_those_of_the_page_and_can_be_of_another_file(tmp_path, capsys):
+    """The command without arguments shows the records from which the page is made."""
+    assert main(["derivatives", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert {row["scene"] for row in found["rows"]} == {mechanism.name for mechanism in MECHANISMS}
+    assert {row["grade"] for row in found["rows"] if row["engine"] == "mbref"} == {"right"}
+    records, out = tmp_path / "few.jsonl", tmp_path / "page.md"
+    rewrite(records, [record for record in read() if record["engine"] == "mbref"])
+    assert main(["derivatives", "--records", str(records), "--page", str(out)]) == 0
+    assert "(#mbref)" in out.read_text() and "(#pinocchio)" not in out.read_text()
+
+
+@pytest.mark.skipif(not installed("pinocchio"), reason="needs Pinocchio")
+def test_pinocchio_is_right_about_a_link_of_constant_length_that_its_adapter_makes_a_rod(loop, capsys):
+    """The rod has inertia about its axis, and derivatives are along motions on which it does not spin."""
+    main(["derivatives", "pinocchio", loop, "--json"])
+    found = json.loads(capsys.readouterr().out)["rows"]
+    judged = [row for row in found if row["truth"] == "judge" and row["function"] == "LOCAL"]
+    assert len(judged) == 6 and max(row["error"] for row in judged) <= 1e-8
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not installed("drake"), reason="needs Drake")
+def test_drakes_terms_are_differentiated_right_also_with_open_loops(loop, capsys):
+    assert main(["derivatives", "drake", loop, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["rows"]
+    assert {row["grade"] for row in found} == {"right"}
+    assert {row["state"] for row in found} == {"moving", "at rest", "open loops"}
 
 
 @pytest.mark.slow
@@ -59,11 +134,11 @@ def test_known_defects_of_pinocchios_derivatives_are_found(capsys):
     main(["derivatives", "pinocchio", "--json"])
     found = json.loads(capsys.readouterr().out)
     wrong = [row for row in found["rows"] if row["grade"] == "wrong"]
-    pinned = {"ball_four_bar", "random_2"}
+    pinned = {"ball_four_bar", "random_2", "fast_four_bar"}
     own = [row for row in wrong if row["truth"] == "own differences"]
     at_points = [row for row in own if row["scene"] in pinned]
     assert {row["scene"] for row in at_points} == pinned
-    assert {row["by"] for row in at_points} == {"position"}
+    assert {row["by"] for row in at_points if "Baumgarte" not in row["function"]} == {"position"}
     others = [row for row in wrong if row["scene"] not in pinned]
     assert {(row["function"], row["state"]) for row in others} == {
         ("LOCAL_WORLD_ALIGNED, Baumgarte", "open loops")
