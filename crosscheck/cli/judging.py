@@ -38,9 +38,9 @@ def judge(arguments: argparse.Namespace) -> int:
         raise RequestError(f"{arguments.table}: {error.strerror}") from None
     found = judge_motion(scene, recording, arguments.reference_time, arguments.tolerance, _said)
     if arguments.json:
-        print(json.dumps({**found.to_record(), "ignored": list(recording.ignored)}, allow_nan=False))
+        print(json.dumps(found.to_record(), allow_nan=False))
     else:
-        _show(found, recording.ignored)
+        _show(found)
     return COMPLETED if found.is_right else OTHERWISE
 
 
@@ -55,7 +55,7 @@ def _assigned(text: str) -> tuple[str, str]:
     return name, place
 
 
-def _show(found: Judgement, ignored: Sequence[str]) -> None:
+def _show(found: Judgement) -> None:
     table = Table("column", "largest error", "bound", "", "begins at", title="against the reference")
     for c in found.columns:
         begins = "" if c.begins is None else f"{c.begins:.4g} s"
@@ -73,9 +73,9 @@ def _show(found: Judgement, ignored: Sequence[str]) -> None:
         console().print(f"{_nothing(found)}.")
     for e in found.explanations:
         console().print(f"{e.sentence}: {100 * e.remains:.2g} % of the difference remains", soft_wrap=True)
-    if ignored:
-        rest = f" and {len(ignored) - SHOWN} more" if len(ignored) > SHOWN else ""
-        console().print(f"not read: {', '.join(ignored[:SHOWN])}{rest}", soft_wrap=True)
+    if found.ignored:
+        rest = f" and {len(found.ignored) - SHOWN} more" if len(found.ignored) > SHOWN else ""
+        console().print(f"not read: {', '.join(found.ignored[:SHOWN])}{rest}", soft_wrap=True)
 
 
 def _say_uncounted(names: Sequence[str]) -> None:
@@ -97,7 +97,8 @@ def _nothing(found: Judgement) -> str:
 def _verdict(column: ColumnError) -> str:
     digits = f"rounded to {column.rounded_to} digit{'s' * (column.rounded_to != 1)}"
     if column.is_right:
-        return "right" if column.rounded_to is None else f"right, {digits}"
+        within = f", within {column.allowed:.1e} {SI[kind_of(column.name)]}" if column.is_small else ""
+        return f"right{within}" if column.rounded_to is None else f"right, {digits}"
     return f"too coarse, {digits}" if column.largest <= column.allowed else "off"
 
 

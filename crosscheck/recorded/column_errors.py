@@ -12,7 +12,7 @@ from crosscheck.recorded.explanations import with_signs
 from crosscheck.recorded.number_formats import WHOLE
 
 BEGINS = 0.01  # fraction of the largest error at which an error is said to begin
-SHARE = 1e-3  # fraction of a column's range; a coarser rounding is stated beside "right"
+SHARE = 1e-3  # fraction of a column's range; a coarser rounding or tolerance is stated beside "right"
 # fraction of a quantity's size, or of the column's range; numbers rounded more coarsely are not judged
 COARSEST = 0.1
 FINE = 1e-12  # fraction of a quantity's size; a finer rounding is not stated, also of constant columns
@@ -47,6 +47,8 @@ class ColumnError:
         exceeds the part SHARE of the column's range.
     is_coarse : bool
         True if the rounding exceeds the part COARSEST of the quantity's size: the column cannot be judged.
+    is_small : bool
+        True if the tolerance exceeds the part SHARE of the column's largest number.
     """
 
     name: str
@@ -56,6 +58,7 @@ class ColumnError:
     begins: float | None
     rounded_to: int | None = None
     is_coarse: bool = False
+    is_small: bool = False
 
     @property
     def is_right(self) -> bool:
@@ -104,20 +107,15 @@ class Compared:
         extent = float(np.ptp(self.exact[name]))
         rounded = digits if half > max(SHARE * extent, FINE * self.scale[name]) else None
         coarse = bool(half > COARSEST * max(extent, self.scale[name]))
+        bound, top = float(self.bound[name].max()), float(np.abs(self.exact[name]).max())
+        is_small = max(bound, FINE * self.scale[name]) < top < self.tolerance[name] / SHARE
+        states = rounded, coarse, is_small
         if not off.any():
-            return ColumnError(
-                name,
-                float(size.max()),
-                float(self.bound[name].max()),
-                float(allowed.max()),
-                None,
-                rounded,
-                coarse,
-            )
+            return ColumnError(name, float(size.max()), bound, float(allowed.max()), None, *states)
         k = int(np.argmax(np.where(off, size, -1.0)))
         largest, begins = float(size[k]), off & (size > BEGINS * size[k])
         at = float(self.times[int(np.argmax(begins))])
-        return ColumnError(name, largest, float(self.bound[name][k]), float(allowed[k]), at, rounded, coarse)
+        return ColumnError(name, largest, float(self.bound[name][k]), float(allowed[k]), at, *states)
 
 
 def aligned(compared: Compared, half: np.ndarray, later: Mapping[str, Callable[..., np.ndarray]]) -> Compared:

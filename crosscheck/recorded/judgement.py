@@ -39,6 +39,7 @@ class Judgement:
     alike: int = 0  # number of changes that explain the difference and that the table does not tell apart
     is_complete: bool = True  # False if the search for explanations ended by its limit of CPU time
     is_whole: bool = True  # False if the exact motion ends before the table
+    ignored: tuple[str, ...] = ()  # columns of the table that are not of the scene
 
     @property
     def is_right(self) -> bool:
@@ -55,6 +56,7 @@ class Judgement:
             "not counted": list(self.uncounted),
             "alike": self.alike,
             "searched": self.is_complete,
+            "ignored": list(self.ignored),
             "columns": [{**vars(c), "right": c.is_right} for c in self.columns],
             "explanations": [vars(e) for e in self.explanations],
         }
@@ -123,7 +125,7 @@ def _of_columns(scene: Scene, columns: dict[str, np.ndarray]) -> Recording:
             raise SceneError([f"column {name}: is not finite; leave out such columns or rows"])
     if times[0] < 0 or np.any(np.diff(times) <= 0):
         raise SceneError(["column time: times must not be negative and must increase"])
-    return Recording(times, found)
+    return Recording(times, found, ignored=[name for name in columns if name not in found])
 
 
 def _from_start(scene: Scene, recording: Recording) -> Recording:
@@ -181,5 +183,14 @@ def _judged(
     turning = tuple(n for n in uncounted(columns) if n in left)
     known = recording.times <= found.motion.times[-1]
     until, searched = float(recording.times[known][-1]), (causes.alike, causes.is_complete)
-    is_whole = bool(known.all())
-    return Judgement(errors, causes.explanations, until, found.reason, left, turning, *searched, is_whole)
+    return Judgement(
+        errors,
+        causes.explanations,
+        until,
+        found.reason,
+        left,
+        turning,
+        *searched,
+        is_whole=bool(known.all()),
+        ignored=tuple(recording.ignored),
+    )

@@ -10,7 +10,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -71,8 +70,11 @@ def read(
     digits = {name: _digits(table[:, k], halves[name]) for name, k in chosen.items()}
     rounding = {name: half * factors[name] for name, half in halves.items()}
     times = _checked_times(found.pop("time"), scene, path)
-    if order != "wxyz":
-        found, rounding, digits = (_reordered(of, order) for of in (found, rounding, digits))
+    if order != ORDERS[0]:
+        letters = _letters(chosen, order)
+        found = {letters.get(name, name): column for name, column in found.items()}
+        rounding = {letters.get(name, name): half for name, half in rounding.items()}
+        digits = {letters.get(name, name): count for name, count in digits.items()}
     ignored = [h for k, h in enumerate(headers) if k not in chosen.values()]
     return Recording(times, found, rounding, digits, ignored)
 
@@ -117,7 +119,10 @@ def _chosen(
     """Return for each column of the scene the number of the table's column, and its unit if a unit is
     given."""
     known = ["time", *names(scene)]
-    columns = {_recognised(name, known)[0] or name: place for name, place in columns.items()}
+    full = [_recognised(name, known)[0] or name for name in columns]
+    if twice := next((name for name in full if full.count(name) > 1), ""):
+        raise SceneError([f"--column {twice}: is given twice; give it one place"])
+    columns = dict(zip(full, columns.values(), strict=True))
     chosen: dict[str, int] = {}
     units: dict[str, str] = {}
     for k, header in enumerate(headers):
@@ -135,7 +140,8 @@ def _chosen(
             meant = f"; did you mean {near[0]!r}?" if near else ""
             raise SceneError([f"--column {name}: the scene has no such column{meant}"])
         where, _, unit = place.partition(":")
-        chosen[name], units[name] = _place(where, headers, name), unit
+        chosen[name] = _place(where, headers, name)
+        units[name] = unit or _own_unit(headers[chosen[name]], name)
     if "time" not in chosen:
         raise SceneError([f"{path}: has no column time; --column time=1 gives one"])
     if len(chosen) < 2:
@@ -159,6 +165,18 @@ def _recognised(header: str, known: Sequence[str]) -> tuple[str, str]:
     return "", unit
 
 
+def _own_unit(header: str, name: str) -> str:
+    """Return the unit in brackets at the end of a header, such as ``Crank angle [deg]``, if it is a unit of
+    the column's quantity; otherwise an empty text: ``r_0[1]`` is a component."""
+    match = re.search(r"[\[(]([^\[\]()]*)[\])]\s*$", header)
+    try:
+        known = unit(match[1].strip()) if match else None
+    except ValueError:
+        return ""
+    is_own = match and known and known.dimension == unit(_si(name)).dimension
+    return match[1].strip() if match and is_own else ""
+
+
 def _place(where: str, headers: Sequence[str], name: str) -> int:
     if where in headers:
         return headers.index(where)
@@ -169,13 +187,18 @@ def _place(where: str, headers: Sequence[str], name: str) -> int:
 
 def _factor(name: str, own: str, units: Sequence[str]) -> float:
     """Return the factor to SI, from the column's own unit or from the unit given for its quantity."""
-    si = SI["time" if name == "time" else kind_of(name)]
+    si = _si(name)
     given = [_unit(own, f"column {name}: ")] if own else []
     known = [*map(_unit, units), *given]
     fitting = [each for each in known if each.dimension == unit(si).dimension]
     if own and fitting[-1:] != given:
         raise SceneError([f"column {name}: {own!r} is not a unit of a quantity in {si}"])
     return float(fitting[-1].factor) if fitting else 1.0
+
+
+def _si(name: str) -> str:
+    """Return the SI unit of a column of the scene or of ``time``."""
+    return SI["time" if name == "time" else kind_of(name)]
 
 
 def _unit(text: str, where: str = "") -> Unit:
@@ -220,9 +243,17 @@ def _checked_times(times: np.ndarray, scene: Scene, path: Path) -> np.ndarray:
     return times
 
 
-def _reordered(columns: dict[str, Any], order: str) -> dict[str, Any]:
-    """Return columns in which the quaternion components are named by their place in the table's order."""
+def _letters(chosen: Mapping[str, int], order: str) -> dict[str, str]:
+    """Return the true name of each quaternion component: the columns of a whole quaternion, from the left to
+    the right of the table, have the letters of ``order``; one of a part has the letter of its own place."""
     if order not in ORDERS:
         raise SceneError([f"--quaternion: must be one of {', '.join(ORDERS)}, got {order!r}"])
-    rename = dict(zip(ORDERS[0], order, strict=True))
-    return {f"{n[:-1]}{rename[n[-1]]}" if kind_of(n) == "orientation" else n: v for n, v in columns.items()}
+    found: dict[str, str] = {}
+    for body in {name[:-1] for name in chosen if kind_of(name) == "orientation"}:
+        own = [f"{body}{letter}" for letter in ORDERS[0] if f"{body}{letter}" in chosen]
+        if len(own) == len(order):
+            own.sort(key=lambda name: chosen[name])
+            found |= {name: f"{body}{letter}" for name, letter in zip(own, order, strict=True)}
+        else:
+            found |= {name: f"{body}{order[ORDERS[0].index(name[-1])]}" for name in own}
+    return found

@@ -10,7 +10,7 @@ from crosscheck.recorded.exact import reference_table, write
 from crosscheck.recorded.judgement import judge_motion
 from crosscheck.recorded.reading import read
 from mbref import rotations
-from mbref.scene import Body, Scene, SceneError, Spring, TorsionSpring
+from mbref.scene import Body, Scene, SceneError, SlideSpring, Spring, TorsionSpring, Translational
 from tests.helpers.tables import double_pendulum, turned
 
 TIMES = np.linspace(0.0, 0.4, 81)
@@ -160,16 +160,66 @@ def test_tables_in_other_units_and_orders_are_judged_right(table, tmp_path):
         ("time,upper.x\n0,1\n800,1\n", {}, "if they are in ms"),
         ("time,upper.x\n0,1\n", {"uper.position.x": "2"}, "did you mean 'upper.position.x'"),
         ("time,upper.x\n0,1\n", {"upper.position.x": "3"}, "no column '3'"),
+        ("time,upper.x\n0,1\n", {"upper.position.x": "2", "upper.x": "1"}, "is given twice"),
         ("time,upper.x [furlong]\n0,1\n", {}, "unknown unit 'furlong'"),
         ("time,upper.x [deg]\n0,1\n", {}, "'deg' is not a unit of a quantity in m"),
     ],
 )
 def test_faulty_table_is_refused_with_its_fault(text, columns, says, tmp_path):
-    """A time of 800 s, a name with a slip, a column that is not there, and two wrong units: a part of the
-    error names each."""
+    """A time of 800 s, a name with a slip, a column that is not there, two places, two wrong units: a part
+    of the error names each."""
     (tmp_path / "faulty.csv").write_text(text)
     with pytest.raises(SceneError, match=says):
         read(tmp_path / "faulty.csv", SCENE, columns)
+
+
+@pytest.mark.parametrize(
+    ("headers", "columns", "order"),
+    [
+        ("lower.x [mm],lower.position.x [mm]", {"lower.x": "3"}, "wxyz"),
+        ("lower.x,Way of the rod (mm)", {"lower.position.x": "Way of the rod (mm)"}, "wxyz"),
+        ("lower.x,r[1]", {"lower.x": "r[1]:mm"}, "wxyz"),
+        ("lower.qx,lower.qy,lower.qz,lower.qw", {}, "xyzw"),
+        ("lower.qx,lower.qy,lower.qz,lower.qw", {}, "wxyz"),
+        ("lower.qw,lower.qx,lower.qy,lower.qz", {}, "xyzw"),
+    ],
+)
+def test_chosen_columns_have_the_units_and_places_of_their_headers(headers, columns, order, table, tmp_path):
+    """A second column in mm is chosen by number or header. Components have w last, and names that are right
+    for both orders, or of another order."""
+    wanted = [table["lower.position.x"] * 1e3] * 2
+    if "q" in headers:
+        wanted = [table[f"lower.orientation.{a}"] for a in "xyzw"]
+    rows = "\n".join(
+        ",".join(map(repr, row)) for row in zip(*(c.tolist() for c in (TIMES, *wanted)), strict=True)
+    )
+    (tmp_path / "run.csv").write_text(f"time,{headers}\n{rows}\n")
+    assert judge_motion(SCENE, read(tmp_path / "run.csv", SCENE, columns, order=order)).is_right
+
+
+def test_column_below_the_tolerance_and_columns_of_no_scene_are_said(tmp_path, capsys):
+    """A weight of 10 N on a spring moves as 1 - A + A cos 2t, A = 1e-5 m. Its energy 2 A² sin² 2t J is below
+    1e-8 of the scene's energy, so that an energy of zero is right only within that. `S.way` is no column."""
+    size = 1e-5
+    scene = Scene(
+        name="slow",
+        gravity=(0.0, 0.0, -10.0),
+        duration=2.0,
+        body=[Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(1.0, 0.0, 0.0))],
+        joint=[Translational(name="S", bodies=("ground", "b"), anchor=(0, 0, 0), axis=(1.0, 0.0, 0.0))],
+        load=[SlideSpring(joint="S", stiffness=4.0, natural_displacement=-size)],
+    )
+    times = np.linspace(0.0, 2.0, 21)
+    x = 1 - size + size * np.cos(2 * times)
+    motion = {"time": times, "b.position.x": x, "b.position.z": 0 * x, "kinetic_energy": 0 * x, "S.way": x}
+    assert judge_motion(scene, motion).ignored == ("S.way",)
+    write(motion, tmp_path / "run.csv")
+    scene.save(tmp_path / "slow.toml")
+    assert main(["judge", str(tmp_path / "slow.toml"), str(tmp_path / "run.csv")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    shown = {cells[1].strip(): cells[4].strip() for line in lines if len(cells := line.split("│")) == 7}
+    assert {n: v for n, v in shown.items() if v != "right"} == {"kinetic_energy": "right, within 1.0e-07 J"}
+    assert "not read: S.way" in lines[-1]
 
 
 def test_reference_command_writes_a_table_that_judge_finds_right(tmp_path, capsys):
