@@ -23,7 +23,8 @@ class SynthesisProblem:
     the time of each point over the scene's duration.
 
     ``refused`` counts the trials without a motion to the last sample; ``last_reason`` is a sentence on the
-    last one. A residual of a mean square is over the root of the count of all.
+    last one. ``has_derivatives`` is true after the first Jacobian. A residual of a mean square is over the
+    root of the count of all.
     """
 
     def __init__(self, numbers: FreeNumbers, goal: Goal, limits: Limits, peak: bool):
@@ -32,7 +33,7 @@ class SynthesisProblem:
         shape = goal.wanted.shape
         self.scales = np.broadcast_to(goal.units * (1.0 if peak else np.sqrt(self.given.sum())), shape)
         self.duration = numbers.scene.duration
-        self.refused, self.last_reason = 0, ""
+        self.refused, self.last_reason, self.has_derivatives = 0, "", False
         self._accurate: AccurateStencils = {}
 
     @property
@@ -88,6 +89,7 @@ class SynthesisProblem:
         )
         if len(found) < times.size:
             raise InputError(motion.message or "the motion has no derivatives to its last sample")
+        self.has_derivatives = True
         order = [names.index(name) for name in goal.columns]
         by_number = found[inverse][:, order] * self.numbers.sizes
         if goal.times is None:

@@ -15,7 +15,7 @@ from mbref.design.synthesis.problem import SynthesisProblem
 from mbref.design.synthesis.result import SynthesisResult
 from mbref.design.synthesis.trust_region import SearchEnd, least_residuals, residual_size
 from mbref.input_error import InputError
-from mbref.scene import Scene
+from mbref.scene import Scene, SceneError
 from mbref.scenes import find_scene
 from mbref.stepping.limits import Limits
 
@@ -150,7 +150,7 @@ class _Search:
 
     def _from(self, k: int, z: np.ndarray | None) -> SearchEnd | None:
         """Return the search from the start with an index, None where it cannot begin or go on; raises the
-        errors of the scene's own numbers, which hold for all."""
+        errors of the first derivatives, which hold for all starts."""
         problem = self.problem
         if z is None or np.isnan(problem.residuals(z)).any():
             return None
@@ -160,8 +160,8 @@ class _Search:
 
         try:
             found = least_residuals(problem.residuals, problem.jacobian, z, self.box, problem.peak, progress)
-        except InputError as fault:
-            if not k:
+        except (InputError, SceneError) as fault:
+            if not problem.has_derivatives:
                 raise
             problem.last_reason = str(fault)
             return None
