@@ -17,6 +17,7 @@ from crosscheck.recorded.column_errors import ColumnError, Columns, Compared, al
 from crosscheck.recorded.columns import kind_of, names, scales, start_columns
 from crosscheck.recorded.exact import DENSE, Exact, dense_exact, uncounted
 from crosscheck.recorded.explanations import Explanation, with_signs
+from crosscheck.recorded.leaps import leaps, with_sides
 from crosscheck.recorded.reading import Recording, read
 from crosscheck.recorded.search import SECONDS as SEARCHED
 from crosscheck.recorded.search import Search, search
@@ -92,12 +93,14 @@ def judge_motion(
     """
     recording = _from_start(scene, _as_recording(scene, motion))
     scene = started(scene)
-    found, columns = dense_exact(scene, recording.times, seconds, recording.columns)
+    sides = [t for both in leaps(scene, recording.times).values() for t in both]
+    times = np.union1d(recording.times, sides)
+    found, columns = dense_exact(scene, times, seconds, recording.columns)
     if not (found.motion.times >= recording.times[0]).any():
         raise SceneError([f"{scene.name}: has no reference: {found.reason}"])
     compared, later = _compared(scene, recording, found, columns, tolerance)
     if not compared.is_right and not np.isin(compared.times, recording.times).all():
-        found, columns = dense_exact(scene, recording.times, seconds, recording.columns, FINER * DENSE)
+        found, columns = dense_exact(scene, times, seconds, recording.columns, FINER * DENSE)
         compared, later = _compared(scene, recording, found, columns, tolerance)
     return _judged(scene, recording, found, (columns, compared, later), progress)
 
@@ -161,6 +164,8 @@ def _compared(
         recording.digits,
         scale,
     )
+    sides = {k: both for k, both in leaps(scene, times).items() if both[1] <= found.motion.times[-1]}
+    compared = with_sides(compared, sides, found.motion.times, whole)
     if "time" in recording.rounding:
         compared = aligned(compared, recording.rounding["time"][known], later)
     return compared, later

@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 import crosscheck
 from crosscheck.cli import main
 from crosscheck.conformance.changes.units import in_other_units
-from mbref.scene import Coupling, Driver, Scene, SlideSpring, TorsionSpring
+from mbref.scene import Body, Coupling, Driver, Force, Scene, SlideSpring, TorsionSpring
 from tests.helpers.parts import hinge, slide, spring
 from tests.helpers.statics import parallelogram, rod
 
@@ -166,3 +166,23 @@ def test_driver_torque_of_a_closed_loop_grows_with_the_square_of_its_size():
 def test_torque_of_one_of_two_drivers_of_one_freedom_is_not_a_number(length):
     """Drivers at A and D move the parallelogram's one freedom: only the sum of torques is determined."""
     assert np.isnan(torque_of_a(length, "AD"))
+
+
+@pytest.mark.parametrize(
+    "start", [0.3, np.nextafter(0.3, 0.0)], ids=["as written", "a unit of rounding before"]
+)
+def test_samples_at_which_a_force_is_switched_may_have_its_value_on_either_side(start: float) -> None:
+    """A force of 4 N acts on 2 kg from 0.3 s to 0.7 s, so that x = (t - 0.3)² m between, and the acceleration
+    leaps to 2 m/s² and back at samples. It is 2 m/s² or 0 there, for all columns of the sample, but not 1."""
+    times = np.linspace(0.0, 1.0, 11)
+    times[3] = start
+    gone = np.clip(times - 0.3, 0.0, 0.4)
+    block = Body(name="b", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
+    load = Force(body="b", point=(0, 0, 0), force=(4.0, 0.0, 0.0), factor={"start": 0.3, "stop": 0.7})
+    scene = Scene(name="switched", duration=1.0, body=[block], load=[load])
+    path = {"time": times, "b.position.x": gone**2 + 0.8 * np.clip(times - 0.7, 0.0, None)}
+    for at, is_right in (((2.0, 0.0), True), ((0.0, 2.0), True), ((0.0, 0.0), True), ((1.0, 0.0), False)):
+        pushed = np.where((times > 0.35) & (times < 0.65), 2.0, 0.0)
+        pushed[[3, 7]] = at
+        motion = {**path, "b.velocity.x": 2 * gone, "b.acceleration.x": pushed}
+        assert crosscheck.judge_motion(scene, motion).is_right is is_right, at
