@@ -34,7 +34,10 @@ def with_sides(
     times: np.ndarray,
     columns: Mapping[str, np.ndarray],
 ) -> Compared:
-    """Return the comparison of each sample at a leap with the nearer side, of all columns with one side. ``columns`` (m,) is the exact motion at ``times`` (m,)."""
+    """Return the comparison of each sample at a leap with the nearer side, of all columns with one side.
+
+    ``columns`` (m,) is the exact motion at ``times`` (m,).
+    """
     exact = {n: column.copy() for n, column in compared.exact.items()}
     names = list(exact)
     for k, both in sides.items():

@@ -26,6 +26,9 @@ SHORT = {  # last part of a header → column of the scene
 }
 # a cell of a number alone, in which a comma may be the decimal point
 FIRST_CELL = re.compile(r"([\"']?)[-+]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?\1\s*([;,\s]|$)")
+# name and unit: rod.x [mm], rod.x (mm), rod.x/mm
+HEADER = re.compile(r"\s*(.*?)\s*(?:[\[(]\s*([^\[\]()]*?)\s*[\])]?|/\s*([\w/ *^]*?))?\s*")
+NO_UNIT = "-"  # in brackets, as in rod.qw [-]
 INFINITE = ("inf", "infinity")
 ORDERS = ("wxyz", "xyzw")
 LONGEST = 1000  # characters of a cell; the longest decimal number of double precision has 770 digits
@@ -153,8 +156,9 @@ def _chosen(
 def _recognised(header: str, known: Sequence[str]) -> tuple[str, str]:
     """Return column and unit of a header such as ``rod.position.x [mm]`` or ``rod.x``; empty if the header
     names no column of the scene, or several that differ in the case of letters."""
-    match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(/]\s*([\w/ *^]*?)\s*[\])]?)?\s*", header)
-    text, unit = (match[1], match[2] or "") if match else (header, "")
+    match = HEADER.fullmatch(header)
+    text, unit = (match[1], match[2] or match[3] or "") if match else (header, "")
+    unit = "" if unit == NO_UNIT else unit
     if text.lower() in ("t", "time"):
         return "time", unit
     body, _, last = text.rpartition(".")

@@ -147,7 +147,7 @@ def test_tables_in_other_units_and_orders_are_judged_right(table, tmp_path):
     assert judge_motion(SCENE, found).is_right
     rows = zip(TIMES, x, angle, strict=True)
     lines = [";".join(f"{v:.9f}".replace(".", ",") for v in row) for row in rows]
-    (tmp_path / "german.csv").write_text("\n".join(["Time;lower.x [mm];A.angle (deg)", *lines]))
+    (tmp_path / "german.csv").write_text("\n".join(["Time;lower.x/mm;A.angle [°]", *lines]))
     assert judge_motion(SCENE, read(tmp_path / "german.csv", SCENE, {})).is_right
     last = turned(lambda q: q[:, [1, 2, 3, 0]])(SCENE, table)
     write(last, tmp_path / "last.csv")
@@ -180,7 +180,7 @@ def test_faulty_table_is_refused_with_its_fault(text, columns, says, tmp_path):
         ("lower.x,Way of the rod (mm)", {"lower.position.x": "Way of the rod (mm)"}, "wxyz"),
         ("lower.x,r[1]", {"lower.x": "r[1]:mm"}, "wxyz"),
         ("lower.qx,lower.qy,lower.qz,lower.qw", {}, "xyzw"),
-        ("lower.qx,lower.qy,lower.qz,lower.qw", {}, "wxyz"),
+        ("lower.qx [-],lower.qy [-],lower.qz [-],lower.qw [-]", {}, "wxyz"),
         ("lower.qw,lower.qx,lower.qy,lower.qz", {}, "xyzw"),
     ],
 )
