@@ -13,7 +13,7 @@ from mbref.scene import Body, Scene
 from mbref.scenes import find_scene
 
 FINDINGS = Path(__file__).parents[1] / "findings"
-FAST = 10.0  # factor on velocities: terms of velocities are a hundred times those of the slow mechanism
+FAST = 10.0  # factor on velocities: terms of velocities are a hundred times as large as in the slow mechanism
 NEAR = 0.01  # rad from a singular position
 LENGTH = 0.5  # m, of crank and rod
 RATE = 3.0  # rad/s

@@ -67,8 +67,8 @@ def measure(
     mechanisms: Sequence[Mechanism] = MECHANISMS,
     report: Callable[[str], None] = print,
 ) -> None:
-    """Compare engines on mechanisms, and store each record in place of that of the same engine and
-    mechanism."""
+    """Compare engines on mechanisms, and store each record, which replaces the record of the same
+    engine and mechanism."""
     for name in engines:
         for mechanism in mechanisms:
             report(f"{name}: {mechanism.name}")

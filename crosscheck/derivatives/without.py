@@ -27,10 +27,10 @@ REASONS = {
     ),
     "casadi": Cannot(
         Owner.ADAPTER,
-        "the adapter compiles CasADi's code of accelerations, and not that of their derivatives",
+        "the adapter compiles CasADi's code of accelerations without code of their derivatives",
     ),
     "heyoka": Cannot(
-        Owner.ADAPTER, "the adapter compiles heyoka's equations of motion, and not its variational equations"
+        Owner.ADAPTER, "the adapter compiles heyoka's equations of motion without variational equations"
     ),
     "mjx": Cannot(Owner.ADAPTER, "the adapter does not differentiate MJX's steps by JAX"),
     "warp": Cannot(

@@ -1,8 +1,8 @@
 """Derivatives of accelerations by Drake's AutoDiffXd: of its terms, from which closures are solved here.
 
-With constraints Drake's discrete plant is not differentiated: its solver (SAP) takes doubles only. A
-continuous plant has no constraints. So mass matrix, bias, Jacobians and poses of the continuous plant are
-computed with AutoDiffXd, and M a + h = τ + Jᵀ λ, J a + J̇ v = 0 is differentiated at constant a and λ.
+A continuous plant has no constraints. Mass matrix, bias, Jacobians and poses of the continuous plant are
+computed with AutoDiffXd, and M a + h = τ + Jᵀ λ, J a + J̇ v = 0 is differentiated at constant a and λ. A step
+of the discrete plant, which AutoDiffXd differentiates too, is not compared.
 """
 
 from __future__ import annotations
