@@ -108,7 +108,8 @@ def counted(times: np.ndarray, angle: np.ndarray, rate: np.ndarray) -> np.ndarra
     near = np.lib.stride_tricks.sliding_window_view(np.pad(rate, 2, mode="edge"), 5, axis=0)
     doubt = step * (near.max(axis=-1) - near.min(axis=-1))
     doubt[:1] = np.abs(step[:1] * rate[:1])
-    return np.where(np.cumsum(doubt >= np.pi) > 0, np.nan, np.cumsum(change))
+    turns = np.round((np.cumsum(change) - angle) / (2 * np.pi))  # whole numbers: no rounding adds up
+    return np.where(np.cumsum(doubt >= np.pi) > 0, np.nan, angle + 2 * np.pi * turns)
 
 
 def coordinate_jacobian(scene: Scene, name: str, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:

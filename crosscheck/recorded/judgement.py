@@ -24,6 +24,7 @@ from crosscheck.recorded.search import Search, search
 from crosscheck.recorded.splines import Pieces, splines
 from mbref.scene import Scene, SceneError
 
+ROUNDINGS = 4 * float(np.finfo(float).eps)  # relative error of numbers such as angles of many turns
 FINER = 8  # times as many further samples, if moved times leave errors: they may be of the splines
 
 
@@ -158,7 +159,7 @@ def _compared(
         times,
         recorded,
         exact,
-        {n: scale[n] * error + rounding[n] for n in judged},
+        {n: scale[n] * error + rounding[n] + ROUNDINGS * np.abs(exact[n]) for n in judged},
         {n: tolerance * scale[n] for n in judged},
         rounding,
         recording.digits,

@@ -10,7 +10,7 @@ from crosscheck.recorded.exact import reference_table, write
 from crosscheck.recorded.judgement import judge_motion
 from crosscheck.recorded.reading import read
 from mbref import rotations
-from mbref.scene import Body, Scene, SceneError, SlideSpring, Spring, TorsionSpring, Translational
+from mbref.scene import Body, Revolute, Scene, SceneError, SlideSpring, Spring, TorsionSpring, Translational
 from tests.helpers.tables import double_pendulum, turned
 
 TIMES = np.linspace(0.0, 0.4, 81)
@@ -220,6 +220,22 @@ def test_column_below_the_tolerance_and_columns_of_no_scene_are_said(tmp_path, c
     shown = {cells[1].strip(): cells[4].strip() for line in lines if len(cells := line.split("│")) == 7}
     assert {n: v for n, v in shown.items() if v != "right"} == {"kinetic_energy": "right, within 1.0e-07 J"}
     assert "not read: S.way" in lines[-1]
+
+
+@pytest.mark.parametrize("duration", [100.0, 1e4])
+def test_angle_of_millions_of_turns_is_right_within_its_rounding(duration):
+    """A rotor turns by 1e5 t rad: after 1e4 s the angle 1e9 rad has a rounding of 1.2e-7 rad, above the
+    tolerance. An error of a turn is off."""
+    spin = Body(name="r", mass=1.0, inertia=(1.0,) * 3, position=(0, 0, 0), angular_velocity=(0, 0, 1e5))
+    hinge = Revolute(name="A", bodies=("ground", "r"), anchor=(0, 0, 0), axis=(0, 0, 1.0))
+    scene, times = (
+        Scene(name="spin", duration=duration, body=[spin], joint=[hinge]),
+        np.linspace(0, duration, 11),
+    )
+    angle = 1e5 * times
+    assert judge_motion(scene, {"time": times, "A.angle": angle}).is_right
+    angle[7] += 2 * np.pi
+    assert not judge_motion(scene, {"time": times, "A.angle": angle}).is_right
 
 
 def test_reference_command_writes_a_table_that_judge_finds_right(tmp_path, capsys):
