@@ -154,13 +154,17 @@ class Tangent:
         ]
         return np.array([after - before for after, before in pairs]).T / (2 * h)
 
-    def linear_part(self, share: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return A = ∂y''/∂y and B = ∂y''/∂y' (f, f) by differences of order 8, with a share of the step."""
+    def by_place(self, share: float) -> np.ndarray:
+        """Return A = ∂y''/∂y (f, f) by differences of order 8, with a share of the step."""
         zero, steps = np.zeros(self.freedoms), share * DIFFERENCE_STEP / self.sizes
-        by_place = [directional_derivative(lambda y: self.accelerations(y, zero), h) for h in np.diag(steps)]
-        place, fast = np.array(by_place).T / steps, steps * self.rate_scale
-        by_rate = [directional_derivative(lambda y: self.accelerations(zero, y), h) for h in np.diag(fast)]
-        return place, np.array(by_rate).T / fast
+        changes = [directional_derivative(lambda y: self.accelerations(y, zero), h) for h in np.diag(steps)]
+        return np.array(changes).T / steps
+
+    def by_rate(self, share: float) -> np.ndarray:
+        """Return B = ∂y''/∂y' (f, f) by differences of order 8, with a share of the step."""
+        zero, steps = np.zeros(self.freedoms), share * DIFFERENCE_STEP / self.sizes * self.rate_scale
+        changes = [directional_derivative(lambda y: self.accelerations(zero, y), h) for h in np.diag(steps)]
+        return np.array(changes).T / steps
 
     @property
     def rate_scale(self) -> float:

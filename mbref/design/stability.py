@@ -16,6 +16,9 @@ from mbref.design.linearisation import DIFFERENCE_STEP, EPSILON, Tangent
 # factor on the change of difference quotients with their step, and on rounding of accelerations
 CHANGES, ROUNDINGS = 4.0, 32.0
 OTHER_STEP = 0.7  # factor on the step of the second difference quotients
+# change of difference quotients with the step / its bound by rounding, above which the step is too long for a
+# part, such as a short spring; factor on the step then, and the smallest step / the first one
+LONG_STEP, SHORTENED, SHORTEST = 1e3, 0.1, 1e-5
 
 
 class Eigenvalues(NamedTuple):
@@ -37,18 +40,38 @@ class Linear(NamedTuple):
 
 def linear_at(tangent: Tangent, away: np.ndarray) -> Linear:
     """Return the equations of small motions about a pose that may be ``away`` (f,) from the equilibrium."""
-    (place, rate), (other_place, other_rate) = tangent.linear_part(), tangent.linear_part(OTHER_STEP)
-    # nearly dependent rows magnify rounding by the inverse of their conditioning
-    inverse_steps = ROUNDINGS * EPSILON / tangent.conditioning * tangent.sizes / DIFFERENCE_STEP
-    rounded = tangent.pushes[:, None] * inverse_steps
-    place_errors = (
-        CHANGES * np.abs(place - other_place) + rounded + np.abs(place) * inverse_steps / tangent.sizes
-    )
+    place, place_errors = _by_place(tangent)
+    rate, other_rate = tangent.by_rate(1.0), tangent.by_rate(OTHER_STEP)
     if away.any():
         here, around = tangent.slope(), (tangent.slope(away), tangent.slope(-away))
         place_errors = place_errors + np.max([np.abs(slope - here) for slope in around], axis=0)
+    rounded = tangent.pushes[:, None] * _inverse_steps(tangent)
     rate_errors = CHANGES * np.abs(rate - other_rate) + rounded / tangent.rate_scale
     return Linear(place, rate, place_errors, rate_errors + ROUNDINGS * EPSILON * np.abs(rate))
+
+
+def _by_place(tangent: Tangent) -> tuple[np.ndarray, np.ndarray]:
+    """Return A and the largest errors of its entries (f, f).
+
+    The step of the differences is shortened until A no longer changes with it, except by rounding. If A
+    changes with the shortest step, too, the errors are the largest difference of all steps.
+    """
+    share, found = 1.0, list[np.ndarray]()
+    while share >= SHORTEST:
+        place, other = tangent.by_place(share), tangent.by_place(share * OTHER_STEP)
+        inverse_steps = _inverse_steps(tangent) / share
+        rounded = tangent.pushes[:, None] * inverse_steps + np.abs(place) * inverse_steps / tangent.sizes
+        changes, found = CHANGES * np.abs(place - other), [*found, place]
+        if not (changes > LONG_STEP * rounded).any():
+            return place, changes + rounded
+        share *= SHORTENED
+    return place, np.max([np.abs(each - place) for each in found], axis=0) + changes + rounded
+
+
+def _inverse_steps(tangent: Tangent) -> np.ndarray:
+    """Return the rounding of accelerations over the steps (f,) of the differences; nearly dependent rows
+    magnify rounding by the inverse of their conditioning."""
+    return ROUNDINGS * EPSILON / tangent.conditioning * tangent.sizes / DIFFERENCE_STEP
 
 
 def eigenvalues_of(linear: Linear) -> Eigenvalues:

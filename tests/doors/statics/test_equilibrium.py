@@ -5,7 +5,7 @@ import pytest
 
 from mbref import Scene, SceneError, equilibria, find_scene, motion_of_mode
 from mbref.cli.commands import main
-from tests.helpers.statics import ORIGIN, G, pendulum
+from tests.helpers.statics import ORIGIN, G, pendulum, slide
 
 MASS, INERTIA, ARM = 2.0, 0.3, 0.7  # kg, kg m², m: of the pendulum
 POSE = 1e-10  # m, rad, N: Newton's method ends at forces of about 1e-12 N
@@ -24,6 +24,18 @@ def test_a_damped_torsion_spring_has_the_roots_of_its_equation():
     roots = np.roots([INERTIA + MASS * ARM**2, 3.0, 40.0])
     assert np.allclose(sorted(each.eigenvalues, key=np.imag), sorted(roots, key=np.imag), rtol=rounding)
     assert each.damping_ratios[0] == pytest.approx(-roots[0].real / abs(roots[0]), rel=rounding)
+
+
+@pytest.mark.parametrize("height", [1e-1, 1e-2, 1e-3, 1e-4])
+def test_frequency_on_a_spring_far_shorter_than_the_mechanism_is_that_of_its_stiffness(height):
+    """A slide of 2 kg, 1 m from its guide's anchor, is on a spring across the guide. The spring of 300 N/m is
+    stretched to twice its natural length: half of its stiffness, 150 N/m, acts along the guide."""
+    spring = {"type": "spring", "bodies": ["ground", "rod"], "stiffness": 300.0, "natural_length": height / 2}
+    across = {"points": [[0.7, height, 0.0], [0.7, 0.0, 0.0]]}
+    guide = slide("A", "rod", (-0.3, 0.0, 0.0), (1.0, 0.0, 0.0))
+    [each] = equilibria(pendulum(gravity=ORIGIN, joint=[guide], load=[spring | across]), starts=1)
+    error, exact = abs(abs(each.eigenvalues[0]) - np.sqrt(150.0 / MASS)), np.sqrt(150.0 / MASS)
+    assert error < 1e-4 * exact and error <= each.bounds[0] + 1e-12 * exact
 
 
 def test_scene_of_an_equilibrium_counts_angles_from_its_pose_and_is_its_own_equilibrium():
