@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from mbref.scene.fields import LARGEST, field_of
+from mbref.scene.functions import MOST_PERIODS
 from mbref.scene.joints import JOINT_TYPES
 from mbref.scene.units import Quantity, dimension_of, fits, in_si
 
@@ -30,10 +31,18 @@ def table_faults(path: str, function: Any, data: Mapping[str, Any], start: float
     rows, duration = rows_of(function), field_of(data, "duration")
     if not rows:
         return
-    end = min(stop, _number(1.0 if duration is None else duration))
+    until = _number(1.0 if duration is None else duration)
+    end = min(stop, until)
     if rows[0][0] > start:
         yield path, f"leaves a gap: its first row is at {rows[0][0]:g} s, but it acts from {start:g} s on"
-    if rows[-1][0] < end and not field_of(function, "periodic"):
+    if field_of(function, "periodic"):
+        period = rows[-1][0] - rows[0][0]
+        if period > 0.0 and (until - rows[0][0]) / period > MOST_PERIODS:
+            yield (
+                path,
+                f"has {until / period:.3g} periods of {period:g} s; at most {MOST_PERIODS} are repeated",
+            )
+    elif rows[-1][0] < end:
         yield path, f"leaves a gap: its last row is at {rows[-1][0]:g} s, but it acts until {end:g} s"
 
 

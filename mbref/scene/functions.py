@@ -81,12 +81,11 @@ class TimeFunction(SceneEntry):
         return _closed(table) if info.data.get("periodic") else table
 
     def repeated(self, until: float) -> Self:
-        """Return the function with the rows of a periodic table repeated up to a time (s), at most
-        MOST_PERIODS times."""
+        """Return the function with the rows of a periodic table repeated up to a time (s)."""
         if not (self.periodic and self.table) or self.table[-1][0] >= until:
             return self
         (first, _), *_, (last, _) = self.table
-        count = min(math.ceil((until - first) / (last - first)), MOST_PERIODS)
+        count = math.ceil((until - first) / (last - first))
         rows = [(t + k * (last - first), x) for k in range(count) for t, x in self.table[:-1]]
         end = first + count * (last - first), self.table[-1][1]
         return self.model_copy(update={"table": (*rows, end)})

@@ -91,8 +91,9 @@ def test_run_notes_the_error_of_interpolation_and_proposes_a_periodic_table(peri
     [
         ([*TABLE[:-1], (0.8, 0.1)], "periodic, but begins with 0 and ends with 0.1"),
         ([(t + 0.1, x) for t, x in TABLE], "its first row is at 0.1 s, but it acts from 0 s on"),
+        ([(t * 1e-6, x) for t, x in TABLE], "has 2.5e.06 periods of 8e-07 s; at most 100000 are repeated"),
     ],
 )
-def test_periodic_table_that_does_not_close_or_cover_the_start_is_refused(table, says):
+def test_periodic_table_that_does_not_close_or_cover_the_motion_is_refused(table, says):
     with pytest.raises(SceneError, match=says):
         wheel().with_(driver=({"joint": "J", "table": table, "periodic": True},))
