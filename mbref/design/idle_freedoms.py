@@ -62,7 +62,7 @@ def _links(scene: Scene) -> Iterator[tuple[list[str], list[str]]]:
             links = [link for link in links if link not in joined]
             links.append([name for link in joined for name in link])
     for link in links:
-        ends = [joint for joint in scene.joint if len(set(joint.bodies) & set(link)) == 1]
+        ends = [each for each in scene.joint if each.facts.rows and len(set(each.bodies) & set(link)) == 1]
         if not any(joint.type == "fixed" for joint in ends):
             yield link, [joint.name for joint in ends]
 

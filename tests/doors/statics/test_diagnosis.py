@@ -143,11 +143,21 @@ CHAIN = Scene(
 )
 
 
+SPRUNG = CHAIN.with_(
+    joint=[
+        *CHAIN.joint,
+        {"name": "F", "type": "free", "bodies": ["ground", "lower"], "anchor": [2, 0, 0], "axis": [1, 0, 0]},
+    ],
+    load=[{"type": "slide_spring", "joint": "F", "stiffness": 10.0}],
+)
+
+
 @pytest.mark.parametrize(
     "scene",
-    [ball_linkage(("universal", "spherical")), parallelogram(sine=0.8, cosine=0.6), CHAIN],
-    ids=["rod held by a universal joint", "parallelogram", "last link of a chain"],
+    [ball_linkage(("universal", "spherical")), parallelogram(sine=0.8, cosine=0.6), CHAIN, SPRUNG],
+    ids=["rod held by a universal joint", "parallelogram", "last link of a chain", "spring along a line"],
 )
 def test_no_idle_freedom_is_named_where_no_rod_spins(scene, tmp_path, capsys):
-    """A universal joint holds the rod. The last link of a chain moves nothing else, but does not spin."""
+    """A universal joint holds the rod. The last link of a chain moves nothing else, but does not spin; nor
+    does one whose end has a free joint, for a spring."""
     assert "idle" not in printed(scene, tmp_path, capsys)
