@@ -98,6 +98,13 @@ class _Writer:
         if (form := pose.get("rotation_format", "")) not in FORMATS:
             where = f"{source.tag} {target.get('name')!r}: pose"
             raise SceneError([f"{where}: rotation_format {form!r} is none of {', '.join(FORMATS[1:])}"])
+        if given is not None and (frame_of := pose.get("frame")):
+            raise SceneError(
+                [
+                    f"{source.tag} {target.get('name')!r}: pose frame={frame_of!r} has no meaning in SDF 1.5 "
+                    "and 1.6; write relative_to, and version 1.7"
+                ]
+            )
         relative = pose.get("relative_to")
         pose.set("relative_to", _full(relative, prefix, frame) if relative else base or frame)
         target.append(pose)

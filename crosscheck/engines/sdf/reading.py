@@ -76,6 +76,10 @@ def read(path: Path, options: ImportOptions) -> Imported:
     parts = {part.tag for part in (root if world is None else world)}
     if root.tag != "sdf" or not parts & {"model", "include"}:
         raise SceneError([f"{path}: has no model"])
+    if world is not None and (others := _beside(root, world)):
+        raise SceneError(
+            [f"{path}: has {', '.join(others)} beside world {world.get('name')!r}; keep one of them"]
+        )
     root = expanded(root, path)
     reader.read(flattened(root))
     if not reader.bodies:
@@ -90,6 +94,12 @@ def read(path: Path, options: ImportOptions) -> Imported:
     wanted = tuple(f"{part.sentence} (--without {part.kind})" for part in reader.parts)
     notes = [] if given is not None else ["gravity is 9.8 m/s² downwards, the default of SDF"]
     return Imported(scene, (*wanted, *unused(root)), tuple([*reader.notes, *notes]))
+
+
+def _beside(root: ET.Element, world: ET.Element) -> list[str]:
+    """Return the other worlds of a file, and the models outside of worlds."""
+    parts = [part for tag in ("world", "model", "include") for part in root.findall(tag)]
+    return [f"{part.tag} {part.get('name', '')!r}" for part in parts if part is not world]
 
 
 @dataclass

@@ -40,6 +40,32 @@ def test_a_limit_that_acts_at_the_start_is_refused_or_left_out_on_request(files,
     assert "(--without limits)" in files.scene(text, "a.xml", *words, "--without", "limits")[1]
 
 
+@pytest.mark.parametrize(("flag", "left"), [("spring", (0.0, 3.0)), ("damper", (2.0, 0.0))])
+def test_a_switch_of_a_file_turns_off_springs_or_dampers_of_tendons(files, flag, left):
+    """MuJoCo's XML reference, flag: ``spring`` disables passive springs, ``damper`` passive dampers, also of
+    tendons. The tendon has 2 N/m and 3 N s/m."""
+    text = LIMITED.format(joint="", tendon="stiffness='2' damping='3'")
+    text = text.replace("<worldbody>", f"<option><flag {flag}='disable'/></option><worldbody>")
+    [load] = files.scene(text, "a.xml")[0].load
+    assert (load.stiffness, load.damping) == left
+
+
+FOLDING = """<mujoco><worldbody><body name="crank"><joint name="A" axis="0 1 0"/>
+<inertial pos="0.5 0 0" mass="1" diaginertia="1 1 1"/>
+<body name="rod" pos="1 0 0"><joint name="B" axis="0 1 0"/>
+<inertial pos="0 0 0.5" mass="1" diaginertia="1 1 1"/></body></body></worldbody>
+<equality><connect name="C" body1="rod" body2="world" anchor="0 0 1"/></equality>
+<keyframe><key name="turning" qvel="2 0"/><key name="still"/></keyframe></mujoco>"""
+
+
+def test_velocities_of_a_keyframe_that_violate_a_loop_are_changed_with_a_note(files):
+    """Crank, rod and ground are a triangle, which is rigid: 2 rad/s of its hinge become 0."""
+    scene, out = files.scene(FOLDING, "a.xml", "--keyframe", "turning")
+    assert np.allclose([[*body.velocity, *body.angular_velocity] for body in scene.body], 0.0, atol=1e-12)
+    assert "velocities of keyframe 'turning' violate the loops" in out and "differ by up to 2 m/s" in out
+    assert "violate the loops" not in files.scene(FOLDING, "b.xml", "--keyframe", "still")[1]
+
+
 @pytest.mark.parametrize(
     ("joint", "tendon", "key"),
     [

@@ -190,6 +190,7 @@ FAULTS = [  # text of `pair`, the text in its place, the error's words
     ("<inertial>", '<inertial auto="true">', "link 'a': inertial auto='true' is not read"),
     ('name="m"', 'name="m" placement_frame="a"', "model 'm': has a placement_frame"),
     ("1.7", "new", "version 'new': is no version of SDF"),
+    (A_AT, A_AT.replace("<pose", '<pose frame="b"'), "link 'a': pose frame='b' has no meaning in SDF 1.5"),
 ]
 
 
@@ -210,6 +211,25 @@ def test_sdf_without_a_moving_body_is_refused(model, says, tmp_path):
     """A world without a model, or with a static one."""
     with pytest.raises(SceneError, match=says):
         read(tmp_path, f"<sdf version='1.7'><world name='w'>{model}</world></sdf>")
+
+
+@pytest.mark.parametrize(
+    ("beside", "says"),
+    [
+        (
+            "<world name='v'><gravity>0 0 -1</gravity><model name='n'/></world>",
+            "has world 'v' beside world 'w'",
+        ),
+        ("<model name='n'><link name='c'/></model>", "has model 'n' beside world 'w'"),
+    ],
+)
+def test_sdf_with_parts_beside_its_world_is_refused_with_their_names(beside, says, tmp_path):
+    """One of two worlds would be left out, with its gravity."""
+    world = "<world name='w'><model name='m'><link name='a'/></model></world>"
+    for text in (world + beside, beside + world):
+        with pytest.raises(SceneError, match="beside world") as caught:
+            read(tmp_path, f"<sdf version='1.7'>{text}</sdf>")
+    assert says in str(caught.value) or "has world 'w' beside world 'v'" in str(caught.value)
 
 
 def test_keyframe_of_an_sdf_file_is_refused(tmp_path):

@@ -127,6 +127,12 @@ def _polynomials(model: Any) -> Iterator[Part]:
 
 def of_tendons(mujoco: Any, model: Any, data: Any, groups: Groups) -> Iterator[Load | Part]:
     """Return a spring for every tendon between two sites that has stiffness or damping."""
+    flags, disabled = mujoco.mjtDisableBit, model.opt.disableflags
+    for numbers, flag in (
+        (model.tendon_stiffness, flags.mjDSBL_SPRING),
+        (model.tendon_damping, flags.mjDSBL_DAMPER),
+    ):
+        numbers[...] *= not disabled & flag
     for k in range(model.ntendon):
         stiffness, damping = float(model.tendon_stiffness[k]), float(model.tendon_damping[k])
         if not stiffness and not damping:

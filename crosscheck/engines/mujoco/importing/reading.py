@@ -208,7 +208,13 @@ class _Reader:
                 f"closure {name!r} was open by {gap:.3g} m or rad; the joints moved to close it"
             )
         data = self.poses.data
-        data.qvel[:] = self.poses.allowed(data.qvel) if np.any(data.qvel) else data.qvel
+        given = data.qvel.copy()
+        data.qvel[:] = self.poses.allowed(given) if np.any(given) else given
+        if (change := np.abs(data.qvel - given).max(initial=0.0)) > OPEN * np.abs(given).max(initial=0.0):
+            self.notes.append(
+                f"velocities of keyframe {self.options.keyframe!r} violate the loops; the nearest ones that "
+                f"obey them differ by up to {change:.3g} m/s or rad/s"
+            )
 
     def _read_joints(self, closures: list[Closure]) -> None:
         data, extent = self.poses.data, self.poses.extent
