@@ -18,7 +18,7 @@ CHANGES, ROUNDINGS = 4.0, 32.0
 OTHER_STEP = 0.7  # factor on the step of the second difference quotients
 # change of difference quotients with the step / its bound by rounding, above which the step is too long for a
 # part, such as a short spring; factor on the step then, and the smallest step / the first one
-LONG_STEP, SHORTENED, SHORTEST = 1e3, 0.1, 1e-5
+LONG_STEP, SHORTENED, SHORTEST_STEP = 1e3, 0.1, 1e-5
 
 
 class Eigenvalues(NamedTuple):
@@ -57,7 +57,7 @@ def _by_place(tangent: Tangent) -> tuple[np.ndarray, np.ndarray]:
     changes with the shortest step, too, the errors are the largest difference of all steps.
     """
     share, found = 1.0, list[np.ndarray]()
-    while share >= SHORTEST:
+    while share >= SHORTEST_STEP:
         place, other = tangent.by_place(share), tangent.by_place(share * OTHER_STEP)
         inverse_steps = _inverse_steps(tangent) / share
         rounded = tangent.pushes[:, None] * inverse_steps + np.abs(place) * inverse_steps / tangent.sizes

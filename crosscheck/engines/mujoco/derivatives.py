@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.differentiating import Differentiating, OwnDerivatives
+from crosscheck.engines.mujoco.drift import drift
 from crosscheck.engines.mujoco.linearised import HARDEST, INCREMENT, STEP, STIFFEST
 from crosscheck.engines.mujoco.model import compiled
 from crosscheck.engines.mujoco.warnings_off import without_warnings
@@ -100,11 +101,10 @@ class _Differentiated:
         mujoco.mj_fwdVelocity(model, data)
         rates, changes = [], []
         for body in self.made.links[list(self.made.tree.own)]:
-            jacobian, change = np.zeros((2, 6, self.nv))
+            jacobian = np.zeros((6, self.nv))
             mujoco.mj_jac(model, data, jacobian[:3], jacobian[3:], data.xpos[body], body)
-            mujoco.mj_jacDot(model, data, change[:3], change[3:], data.xpos[body], body)
             rates.append(jacobian @ v)
-            changes.append(jacobian @ a + change @ v)
+            changes.append(jacobian @ a + drift(model, data, int(body), data.xpos[body]))
         return np.concatenate(rates), np.concatenate(changes)
 
     def spins(self, step: np.ndarray, v: np.ndarray) -> np.ndarray:

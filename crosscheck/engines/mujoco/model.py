@@ -19,6 +19,7 @@ from crosscheck.engines.shared.everything import EVERYTHING
 from crosscheck.engines.shared.initial_velocities import initial_rates
 from crosscheck.engines.shared.spanning_tree import (
     BALL_JOINT,
+    COORDINATES,
     FREE,
     GROUND_LINK,
     SLIDE,
@@ -182,7 +183,8 @@ class _Builder:
                 body.add_freejoint(name=f"free {k}")
                 return
             axis = mobility.axis if mobility.kind != BALL_JOINT else np.ones(3)
-            self.joint[self.tree.starts[k] + i] = body.add_joint(
+            before = sum(COORDINATES[each.kind] for each in link.mobilities[:i])
+            self.joint[self.tree.starts[k] + before] = body.add_joint(
                 name=f"joint {k}.{i}", type=of_kind[mobility.kind], pos=link.anchor - link.position, axis=axis
             )
 

@@ -130,10 +130,12 @@ class Tree:
         index = [j.name for j in scene.joint].index(joint)
         link = next(k for k, item in enumerate(self.links) if item.joint == index)
         found = self.links[link]
-        if kind != DISPLACEMENT:
+        if (kind or scene.joint[index].facts.driven) != DISPLACEMENT:
             return self.starts[link] + found.freedoms - 1
-        kinds = [mobility.kind for mobility in found.mobilities]
-        return self.starts[link] + sum(COORDINATES[k] for k in kinds[: kinds.index(SLIDE)])
+        axis = np.array(scene.joint[index].directions[0])
+        along = [abs(m.axis @ axis) if m.kind == SLIDE else -1.0 for m in found.mobilities]
+        before = found.mobilities[: int(np.argmax(along))]  # a free joint has slides across its axis, too
+        return self.starts[link] + sum(COORDINATES[m.kind] for m in before)
 
     def driven(self, scene: Scene) -> list[tuple[int, Driver]]:
         """Return the index of each driver's velocity, and the driver."""

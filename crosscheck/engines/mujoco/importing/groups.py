@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.mujoco.drift import drift
 from crosscheck.engines.shared.entries import entry
 from mbref import rotations
 from mbref.scene import GROUND, Body
@@ -119,17 +120,15 @@ class Groups:
 
     def drift(self, data: Any, piece: Piece) -> np.ndarray:
         """Return the acceleration (6,) of a body of the scene at constant joint velocities."""
-        rates, velocities, later = np.zeros((6, self.model.nv)), data.qvel.copy(), self._later(piece)
+        velocities, later = data.qvel.copy(), self._later(piece)
         if later:  # joints that do not move the link are at rest
             data.qvel[later] = 0.0
             self.mujoco.mj_comVel(self.model, data)
-        centre = self._centre(data, piece)
-        self.mujoco.mj_jacDot(self.model, data, rates[:3], rates[3:], centre, piece.group)
-        found = rates @ data.qvel
+        found = drift(self.model, data, piece.group, self._centre(data, piece))
         if later:
             data.qvel[:] = velocities
             self.mujoco.mj_comVel(self.model, data)
-        return np.asarray(found)
+        return found
 
     def _later(self, piece: Piece) -> list[int]:
         """Return the indices of the velocities of a group's joints that do not move the piece."""
