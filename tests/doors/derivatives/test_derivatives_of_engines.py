@@ -128,6 +128,18 @@ def test_drakes_terms_are_differentiated_right_also_with_open_loops(loop, capsys
 
 
 @pytest.mark.slow
+def test_mujocos_derivatives_are_right_about_a_turning_body_whose_line_slides_along_a_point(tmp_path, capsys):
+    """MuJoCo's model is a ball joint and, behind it, a slide of one body."""
+    body = {"name": "b", "mass": 1.3, "inertia": [0.02, 0.03, 0.04], "position": [0.1, 0.0, 0.2]}
+    line = {"name": "J", "type": "inline", "bodies": ["b", "ground"], "axis": [0.6, 0.0, -0.8]}
+    joint, turning = {**line, "anchor": [0.3, 0.1, 0.0]}, {**body, "angular_velocity": [1.0, 2.0, 3.0]}
+    Scene(name="line", gravity=(0.0, 0.0, -9.81), body=[turning], joint=[joint]).save(tmp_path / "line.toml")
+    assert main(["derivatives", "mujoco", str(tmp_path / "line.toml"), "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["rows"]
+    assert {row["grade"] for row in rows} == {"right"}
+
+
+@pytest.mark.slow
 @pytest.mark.skipif(not installed("pinocchio"), reason="needs Pinocchio")
 def test_known_defects_of_pinocchios_derivatives_are_found(capsys):
     """Findings pinocchio-derivatives-of-point-closure and -of-open-closure."""
