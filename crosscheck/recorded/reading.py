@@ -24,8 +24,10 @@ SHORT = {  # last part of a header → column of the scene
     **{f"w{a}": f"angular_velocity.{a}" for a in "xyz"},
     **{f"q{a}": f"orientation.{a}" for a in "wxyz"},
 }
-# a cell of a number alone, in which a comma may be the decimal point
-FIRST_CELL = re.compile(r"([\"']?)[-+]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?\1\s*([;,\s]|$)")
+# a cell of a number alone, also of one that is not finite, in which a comma may be the decimal point
+FIRST_CELL = re.compile(
+    r"([\"']?)[-+]?((\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?|nan|inf(inity)?)\1\s*([;,\s]|$)", re.IGNORECASE
+)
 # name and unit: rod.x [mm], rod.x (mm), rod.x/mm
 HEADER = re.compile(r"\s*(.*?)\s*(?:[\[(]\s*([^\[\]()]*?)\s*[\])]?|/\s*([\w/ *^]*?))?\s*")
 NO_UNIT = "-"  # in brackets, as in rod.qw [-]

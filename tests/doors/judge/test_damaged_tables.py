@@ -40,6 +40,7 @@ REFUSED = {
     "more than the largest double": (rows("1e999", at=2), "row 3 is not finite"),
     "not a number": (rows("nan", at=2), "row 3 is not finite"),
     "infinite": (rows("-inf", at=0), "row 1 is not finite"),
+    "not a number in the first cell": ("A.angle,time\nnan,0\n8,0.5", "row 1 is not finite"),
     "underscores": (rows("1_0", at=1), "row 2 of numbers is not 3 numbers: '1_0'"),
     "hexadecimal": (rows("0x10", at=1), "row 2 of numbers is not 3 numbers: '0x10'"),
     "empty": ("", "has no row of numbers"),
