@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbref import rotations
+from mbref.equations.counts import perturbed_state
+from mbref.equations.initial_state import consistent_start
 from mbref.equations.joint_angles import angles_of_pose
 from mbref.equations.lazy import LazyMapping
 from mbref.equations.model import Model
@@ -73,8 +75,15 @@ def least_reactions(
 
 
 def _redundant_at_start(model: Model) -> int:
-    """Return the number of combinations of rows that vanish at the scene's pose."""
-    return vanishing_combinations(model, model.terms(0.0, model.start()).blocks[None]).along.shape[-1]
+    """Return the number of combinations of rows that vanish at the scene's pose, and also near it: at a
+    singular position more of them vanish than elsewhere."""
+    found = _vanishing(model, 0.0, model.start())
+    return min(found, _vanishing(model, *perturbed_state(model, consistent_start(model)))) if found else 0
+
+
+def _vanishing(model: Model, t: float, q: np.ndarray) -> int:
+    """Return the number of combinations of rows that vanish at coordinates q (7 nb,)."""
+    return vanishing_combinations(model, model.terms(t, q).blocks[None]).along.shape[-1]
 
 
 def _always_redundant(model: Model, vanishing: VanishingCombinations) -> int:

@@ -65,7 +65,7 @@ def follow_drivers(memory):
             put_terms(memory.series.past, memory)
             put_angles(0.0, memory)
             return status
-        if clock.time >= progress.end:
+        if status == OK and clock.time >= progress.end:
             return DONE
         if is_full(memory):
             return PAUSED

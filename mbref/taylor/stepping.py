@@ -22,10 +22,11 @@ from mbref.taylor.crossing.location import count_crossings
 from mbref.taylor.crossing.rounding_pole import remove_pole, time_of_pole
 from mbref.taylor.crossing.start import is_turned
 from mbref.taylor.crossing.steps_across import cross_briefly, is_full, switches_branch
-from mbref.taylor.crossing.thresholds import MIN_GAIN
+from mbref.taylor.crossing.thresholds import MIN_GAIN, ROUNDED_MOTION, VIOLATION_FLOOR
 from mbref.taylor.layout import BEGIN, EXPAND, SAVE_SERIES, SERIES, TAKE_STEP
 from mbref.taylor.loads import expand_functions, part_behind_no_length
 from mbref.taylor.mode import is_accurate
+from mbref.taylor.partition import least_pivot
 from mbref.taylor.pose_maps import read_variables
 from mbref.taylor.samples import evaluate_series, keep_sample, put_angles, put_terms
 from mbref.taylor.saved_state import save_series
@@ -109,7 +110,22 @@ def judge_step(h, last, memory):
     if part > 0.0 and off * part > crossing_tolerance(memory) * largest_used(1, memory) * h:
         return STEP_TOO_SMALL
     lost = LOST_MOTION * order * order * crossing_tolerance(memory)
+    if last and is_accurate(memory):
+        lost += error_by_rounding(h, memory)
     return OK if off <= lost + MOTION_ROUNDING * size else STEP_TOO_SMALL
+
+
+@kernel
+def error_by_rounding(h, memory):
+    """Return the error, times the square of the step (s), of the accelerations of the new series by rounding.
+
+    Rounding moves the state by δ and turns the velocity by δ over the least pivot, which changes the
+    accelerations by the velocity squared times δ over the pivot squared. A run that ends near a singular
+    position does not need these accelerations: its last samples are those of the series of the step.
+    """
+    pivot, moved = least_pivot(memory), largest_used(1, memory) * h
+    shift = memory.step.correction + VIOLATION_FLOOR / pivot
+    return ROUNDED_MOTION * shift * (moved / pivot) * (moved / pivot)
 
 
 @kernel

@@ -70,7 +70,9 @@ def ends_near_singular(pivot, memory):
 @kernel
 def time_to_singular_position(h, memory):
     """Return the time (s) at which the least pivot vanishes by linear extrapolation, from both ends of an
-    attempt of h seconds."""
+    attempt of h seconds; 0 for an attempt of no length."""
+    if h == 0.0:
+        return 0.0
     pivot, past = least_pivot(memory), memory.distance.start_pivot
     return h * past / (past + pivot if memory.step.crossed else past - pivot)
 

@@ -45,6 +45,7 @@ VIOLATION_LEFT = 2.0  # violation at the end / start of a step: corrections do n
 TIME_ROUNDING = 3e-16  # violation / (time × speed): drivers are evaluated at a rounded time
 MIN_PIVOT_RATIO = 0.2  # pivot at the end / start: below it the next step loses accuracy
 MIN_PIVOT_RATIO_ACROSS = 0.05  # pivot at the end / start of a crossing step: a step below it starts nearer
+ROUNDED_MOTION = 30.0  # error of accelerations at the end of a run / its estimate: rounding explains it
 MAX_SHIFT = 0.05  # correction / pivot at the end: a larger one may change the branch
 MIN_PIVOT = 1e-9  # pivot / largest pivot: rounding 1e-16 / pivot² exceeds every velocity below it
 MIN_PIVOT_ACROSS = 1e-6  # pivot / largest pivot: rounding decides crossings that start nearer

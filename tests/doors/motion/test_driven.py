@@ -8,6 +8,7 @@ import pytest
 
 from mbref.scene import Cylindrical, Driver, Revolute
 from mbref.scenes import SCENES
+from mbref.scenes.four_bar import four_bar
 from mbref.scenes.links import CRANK_RATE
 from mbref.scenes.planar_slider_crank import slider_crank
 from mbref.simulation.simulate import Limits, simulate
@@ -81,3 +82,13 @@ def test_driven_slider_crank_with_a_longer_rod_stays_on_its_branch_and_crosses_n
     scene = slider_crank(0.5, 0.5 + gap, 0.3, "gap").with_(driver=(driver,))
     run = simulate(scene, "taylor", np.linspace(0.0, 0.1, 23))
     assert relative_error(run, scene) < ROUNDING / math.sqrt(gap) and not run.crossings
+
+
+@pytest.mark.parametrize("distance", [1e-2, 1e-3, 1e-4])
+def test_run_without_length_has_the_sample_at_its_start(distance):
+    """A rhombus starts at a distance (rad) from its flat position, next to which a step of no length ends."""
+    start = simulate(four_bar(math.pi + distance), "taylor", [0.0])
+    assert start.times.tolist() == [0.0]
+    exact = CRANK_RATE**2 * start["coupler"].position[0] * [-1.0, -1.0, 0.0]
+    exact[0] += CRANK_RATE**2 * 0.25  # the coupler's centre is 0.25 m beyond the end of its crank
+    assert np.abs(start["coupler"].acceleration[0] - exact).max() < 1e-4 * CRANK_RATE**2

@@ -184,3 +184,25 @@ def test_equilibrium_determines_no_torque_of_a_driver_at_a_singular_position():
     scene = scene.with_(driver=[{"joint": "A", "polynomial": [0.0, 2 * np.pi]}])
     driver = simulate(scene, times=[0.0, 0.24, 0.25, 0.26]).driver("A")
     assert driver.open.tolist() == [0, 0, 1, 0]
+
+
+@pytest.mark.parametrize("offset", [-1e-6, -1e-8, 1e-8, 1e-6])
+def test_parallelogram_that_stops_next_to_its_second_flat_position_turns_evenly(offset):
+    """Crank and rocker turn from π/4 by ω = -124.8 rad/s, and are flat at 5π/4 rad for the second time. The
+    coupler moves without turning, so that no body has an angular acceleration, and the torque is zero. It is
+    relative to m L² ω², the accelerations to ω²."""
+    rate = 124.8
+    motion = simulate("four_bar_quarter", times=[1.25 * np.pi / rate + offset])
+    assert motion.outcome.name == "COMPLETED", motion.message
+    assert np.abs(motion.angular_acceleration).max() <= 1e-6 * rate**2
+    size = motion.mechanism.body[0].mass * 0.5**2 * rate**2
+    assert np.abs(motion.driver("A").torque).max() <= 1e-6 * size
+
+
+@pytest.mark.parametrize("times", [[0.0], [0.0, 1e-10], [0.0, 0.01]])
+def test_open_torque_at_a_singular_start_does_not_depend_on_the_samples(times):
+    """A driven rhombus starts flat, where its folded branch begins, so that equilibrium does not determine
+    the torque at t = 0."""
+    driver = simulate("four_bar_straight", times=times).driver("A")
+    assert driver.open[0] == 1
+    assert driver.open[-1] == (times[-1] < 1e-6)
