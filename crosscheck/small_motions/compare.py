@@ -12,7 +12,7 @@ from crosscheck.engine import Engine
 from crosscheck.judge.arithmetic import doubles
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.model_identity import gate_times
-from crosscheck.judge.small_motions.equations import Balance, in_doubles, ordered
+from crosscheck.judge.small_motions.equations import STEP, Balance, in_doubles, ordered
 from crosscheck.judge.small_motions.equilibria import Steady
 from crosscheck.judge.small_motions.posed import posed
 from crosscheck.linearising import Linearising
@@ -20,7 +20,9 @@ from mbref import rotations
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 
-H = 2e-3  # increment of differences of an engine's accelerations, rad or lengths; its fourth power is 1.6e-11
+# increment of differences of an engine's accelerations, rad or lengths, where the judge's is STEP; its fourth
+# power is 1.6e-11
+H = 2e-3
 CENTRAL = ((1, 2 / 3), (2, -1 / 12))  # weights of central differences of order 4
 ACCELERATIONS = "accelerations"
 
@@ -85,7 +87,7 @@ class _Accelerations:
     """Accelerations of an engine in the judge's coordinates of small motions."""
 
     def __init__(self, engine: Engine, setting: object, steady: Steady):
-        self.engine, self.setting = engine, setting
+        self.engine, self.setting, self.increment = engine, setting, H * steady.small.step / STEP
         self.balance, self.state = in_doubles(steady.balance), doubles(steady.state)
         basis = steady.small.basis
         self.basis = basis / np.linalg.norm(basis / self.balance.sizes[:, None], axis=0)
@@ -93,11 +95,12 @@ class _Accelerations:
 
     def derivative(self, place: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """Return the derivative (f,) of u'' along a displacement and a rate (f,)."""
+        h = self.increment
         parts = [
-            w * (self._at(k * H * place, k * H * rate) - self._at(-k * H * place, -k * H * rate))
+            w * (self._at(k * h * place, k * h * rate) - self._at(-k * h * place, -k * h * rate))
             for k, w in CENTRAL
         ]
-        return np.asarray(np.sum(parts, axis=0) / H)
+        return np.asarray(np.sum(parts, axis=0) / h)
 
     def _at(self, place: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """Return u'' (f,) at a displaced state. Raises ValueError if the engine reports no accelerations."""

@@ -33,12 +33,14 @@ class NotSteady(Exception):
 
 
 class Small(NamedTuple):
-    """Matrices of small motions u (f,): mass, damping and stiffness (f, f); and N (nv, f)."""
+    """Matrices of small motions u (f,): mass, damping and stiffness (f, f); N (nv, f); and the increment of
+    the difference quotients."""
 
     mass: np.ndarray
     damping: np.ndarray
     stiffness: np.ndarray
     basis: np.ndarray
+    step: float = STEP
 
     def eigenvalues(self) -> np.ndarray:
         """Return the exponents s (2f,), 1/s, of motions exp(s t), slowest first."""
@@ -186,7 +188,7 @@ class Balance:
         mass = self.equations.loads.mass_matrix(at.placed, at.coordinates)[0]
         parts = mass @ basis, self.damping(y, basis, h), self.stiffness(y, basis, h)
         first, second, third = (doubles(basis.T @ part) for part in parts)
-        return Small(first, second, third, doubles(basis))
+        return Small(first, second, third, doubles(basis), h)
 
     def poses(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return positions (nb, 3) and unit quaternions (nb, 4) of the bodies at a state."""

@@ -34,6 +34,9 @@ SAME = 1e-6  # rad or lengths; distance below which two poses count as one
 LINKS = 40  # largest number of poses that are tested between two steady poses
 UNSTEADY = 1e-8  # change of the matrices / largest entry after a rotation; above, the motion is not steady
 ROTATED = 1.0  # rad; rotation after which the matrices are compared
+# change of the stiffness with the increment of differences / largest entry, above which the increment is too
+# long; rad or lengths, an increment that is not shortened
+LONG_STEP, SHORTEST_STEP = 1e-8, 1e-5
 SMALLEST = 4e-16  # relative uncertainty of eigenvalues of matrices in double precision
 
 
@@ -192,7 +195,7 @@ def _steady(balance: Balance, y: np.ndarray, scale: float) -> Steady | None:
         return None
     if not _moves_on(balance, y, doubles(basis)):
         return None
-    small, coarse = balance.small(y), balance.small(y, 2 * STEP)
+    small, coarse = _small_motions(balance, y)
     eigenvalues = small.eigenvalues()
     size = float(np.abs(eigenvalues).max(initial=0.0)) or 1.0
     change = float(np.abs(coarse.eigenvalues() - eigenvalues).max()) / size
@@ -201,6 +204,20 @@ def _steady(balance: Balance, y: np.ndarray, scale: float) -> Steady | None:
     others = [coarse, *_beside(balance, y, small)]
     bounds = error_bounds(small, others)
     return Steady(*balance.poses(y), eigenvalues, max(change, SMALLEST), bounds, balance, y, small)
+
+
+def _small_motions(balance: Balance, y: np.ndarray) -> tuple[Small, Small]:
+    """Return the small motions about a steady state, and the ones by twice the increment of differences.
+
+    Both are shortened until they agree, as for a spring that is far shorter than the mechanism.
+    """
+    step = STEP
+    while True:
+        small, coarse = balance.small(y, step), balance.small(y, 2 * step)
+        change = np.abs(small.stiffness - coarse.stiffness).max(initial=0.0)
+        if change <= LONG_STEP * np.abs(small.stiffness).max(initial=0.0) or step < SHORTEST_STEP:
+            return small, coarse
+        step /= 10
 
 
 def _beside(balance: Balance, y: np.ndarray, small: Small) -> list[Small]:
@@ -214,7 +231,7 @@ def _beside(balance: Balance, y: np.ndarray, small: Small) -> list[Small]:
     share = 3 * min(1.0, STEP / (3 * size))
     moved = balance.moved(y, balance.arithmetic.array((small.basis @ (share * step))[None]))[0]
     try:
-        return [balance.small(balance.steady(balance.closed(moved)))]
+        return [balance.small(balance.steady(balance.closed(moved)), small.step)]
     except NotSteady:
         return []
 

@@ -22,7 +22,7 @@ from crosscheck.small_motions.mechanisms import (
     spring_four_bar,
     turning_pendulum,
 )
-from mbref.scene import SceneError
+from mbref.scene import Scene, SceneError
 from mbref.scenes import find_scene
 from tests.helpers.parts import joint
 from tests.helpers.statics import rod
@@ -49,6 +49,19 @@ def test_judge_finds_the_eigenvalues_of_closed_forms(judged):
         assert found[best].uncertainty < 1e-11
         unstable = max(s.real for s in exact) > 1e-9
         assert found[best].stability == ("unstable" if unstable else "stable")
+
+
+def test_judge_finds_the_frequency_on_a_spring_far_shorter_than_the_mechanism():
+    """A slide of 2 kg, 1 m from its guide's anchor, is on a spring of 1 mm across the guide. The spring of
+    300 N/m is stretched to twice its natural length: half of its stiffness, 150 N/m, acts along the guide."""
+    guide = joint("A", "translational", "ground", "rod", (-0.3, 0.0, 0.0), axis=(1.0, 0.0, 0.0))
+    ends = {"bodies": ["ground", "rod"], "points": [[0.7, 1e-3, 0.0], [0.7, 0.0, 0.0]]}
+    spring = {"type": "spring", **ends, "stiffness": 300.0, "natural_length": 5e-4}
+    scene = Scene(name="short", body=[rod("rod", (0.7, 0.0, 0.0))], joint=[guide], load=[spring])
+    [each] = steady_poses(scene, starts=1)
+    exact = np.sqrt(150.0 / 2.0) * 1j
+    assert error(each.eigenvalues, np.array([exact, -exact])) < 1e-9
+    assert error(by_accelerations(engine("mbref"), each).eigenvalues, each.eigenvalues) < 1e-6
 
 
 def test_steady_poses_are_balanced_with_symmetric_positive_mass_matrix(judged):
