@@ -1,7 +1,7 @@
 """Accelerations of bodies at constant joint velocities.
 
 MuJoCo's ``mj_jacDot`` does not give them for a slide behind a ball joint of one body: it takes the velocity
-of the whole body for that of the ball's axes.
+of the whole body for the velocity of the ball's axes.
 """
 
 from __future__ import annotations
