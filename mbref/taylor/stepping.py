@@ -121,7 +121,7 @@ def error_by_rounding(h, memory):
 
     Rounding moves the state by δ and turns the velocity by δ over the least pivot, which changes the
     accelerations by the velocity squared times δ over the pivot squared. A run that ends near a singular
-    position does not need these accelerations: its last samples are those of the series of the step.
+    position does not need these accelerations: the series of the step gives its last samples.
     """
     pivot, moved = least_pivot(memory), largest_used(1, memory) * h
     shift = memory.step.correction + VIOLATION_FLOOR / pivot
