@@ -1,6 +1,9 @@
 """Scene files: every fault named, round trips, defaults."""
 
 import copy
+import os
+import subprocess
+import sys
 
 import pytest
 
@@ -153,15 +156,19 @@ def test_faults_of_long_or_deep_values_are_shorter_than_200_characters():
     assert faults and max(map(len, faults)) < 200, faults
 
 
-def test_scene_file_is_utf8_in_every_locale_and_may_begin_with_a_byte_order_mark(tmp_path, monkeypatch):
-    """The locale prefers ASCII, the name of the scene needs more; EF BB BF is the mark in UTF-8."""
-    monkeypatch.setattr("locale.getpreferredencoding", lambda *_: "ascii")
+def test_scene_file_is_utf8_in_every_locale_and_may_begin_with_a_byte_order_mark(tmp_path):
+    """A process whose locale has ASCII as encoding reads a scene with a name of more letters and writes it.
+    EF BB BF is the mark in UTF-8."""
     scene = Scene(**changed((("name",), "Türe α")))
-    path = tmp_path / "scene.toml"
-    scene.save(path)
-    assert "Türe α".encode() in path.read_bytes()
-    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
-    assert Scene.from_file(path) == scene
+    scene.save(tmp_path / "given.toml")
+    (tmp_path / "given.toml").write_bytes(b"\xef\xbb\xbf" + (tmp_path / "given.toml").read_bytes())
+    code = "import locale; from mbref.scene import Scene; Scene.from_file('given.toml').save('written.toml')"
+    ascii_locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    command = [sys.executable, "-c", f"{code}; print(locale.getencoding())"]
+    encoding = subprocess.check_output(command, cwd=tmp_path, env=os.environ | ascii_locale, text=True)
+    assert encoding.strip() == "ANSI_X3.4-1968"  # the C library's name of ASCII
+    assert "Türe α".encode() in (tmp_path / "written.toml").read_bytes()
+    assert Scene.from_file(tmp_path / "written.toml") == scene
 
 
 def test_joint_named_ground_is_a_fault_if_the_ground_is_a_body():
