@@ -37,8 +37,10 @@ def test_conformance_tables_count_passes_failures_and_refusals(tmp_path):
     assert rows["closure"][1:] == rows["energy"][1:] == ("0 of 0", "none")
 
 
-def test_explanations_name_known_engines_and_checks_and_every_check_has_a_proof():
-    """The explanations are of violations by engines; a proof is a planted defect that the check detects."""
+def test_explanations_name_known_engines_and_checks_and_every_check_of_the_suite_has_a_proof():
+    """The explanations are of violations by engines; a proof is a planted defect that the check detects.
+    `agreement` is of two engines on random mechanisms, and no check of the suite."""
+    assert explained.explanations()
     for engine, check, _ in explained.explanations():
         assert engine.partition(" ")[0] in engine_names(), engine
         assert check in {*FIRST, *PROPERTIES, AGREEMENT}, check

@@ -11,6 +11,7 @@ from reports.places import of_family, of_run
 from reports.sections import blocks
 from reports.sections.verdict import render as first_screen
 from tests.reports.synthetic import groups, scene
+from tests.reports.synthetic import records as stored_records
 
 
 @pytest.fixture(scope="module")
@@ -62,12 +63,15 @@ def test_marks_of_the_speed_figure_have_the_records_errors_and_times():
 
 
 def test_every_run_has_a_card_with_the_command_that_repeats_it():
-    """The command has scene, engine, setting, samples and duration of the record."""
-    records = [block for block in blocks(groups(), ["records"]) if isinstance(block, Record)]
-    assert sum(len(record.cards) for record in records) == sum(len(group.runs) for group in groups())
-    [card, *_] = records[0].cards
-    assert card.command.startswith("crosscheck run scenes/spatial_slider_crank.toml --engine mbref --setting")
-    assert card.command.endswith("--samples 13 --duration 0.02"), card.command
+    """The command has scene, engine, family, settings, samples and duration of the record."""
+    expected = [
+        f"crosscheck run scenes/{r['scene']}.toml --engine {r['engine']} --setting {r['family']}"
+        + "".join(f" --option {name}={value}" for name, value in r["settings"].items())
+        + " --samples 13 --duration 0.02"
+        for r in stored_records()
+    ]
+    shown = [block for block in blocks(groups(), ["records"]) if isinstance(block, Record)]
+    assert sorted(card.command for record in shown for card in record.cards) == sorted(expected)
 
 
 class Checked(HTMLParser):

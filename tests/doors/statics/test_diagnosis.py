@@ -158,6 +158,7 @@ SPRUNG = CHAIN.with_(
     ids=["rod held by a universal joint", "parallelogram", "last link of a chain", "spring along a line"],
 )
 def test_no_idle_freedom_is_named_where_no_rod_spins(scene, tmp_path, capsys):
-    """A universal joint holds the rod. The last link of a chain moves nothing else, but does not spin; nor
-    does one whose end has a free joint, for a spring."""
-    assert "idle" not in printed(scene, tmp_path, capsys)
+    """A universal joint holds the rod. Links of a parallelogram move only together. The last link of a chain
+    moves nothing else, but does not spin; nor does one whose end has a free joint, for a spring."""
+    assert mbref.idle_freedoms(scene) == []
+    assert "else" not in printed(scene, tmp_path, capsys)  # "moves nothing else", "move nothing else"
