@@ -1,6 +1,7 @@
 """Commands that README and docs print are accepted; `tests/test_printed_commands.py` runs them."""
 
 import functools
+import importlib
 import re
 
 import pytest
@@ -46,8 +47,13 @@ def test_tests_that_pages_select_by_name_exist():
 
 
 def test_tests_that_the_gate_names_exist():
-    """.ci/run names tests as FILE::TEST; pytest would end with an error in CI alone."""
-    named = re.findall(r"(tests/\S+\.py)::(\w+)", (ROOT / ".ci" / "run").read_text())
-    assert named
-    for path, name in named:
-        assert f"def {name}(" in (ROOT / path).read_text(), (path, name)
+    """.ci/run names files, and tests as FILE::TEST[CASE], a text of the test's cases or of their ids; pytest
+    would end with an error in CI alone."""
+    named = re.findall(r"(tests/\S+)\.py(?:::(\w+)\[(.+?)\])?", (ROOT / ".ci" / "run").read_text())
+    assert any(name for _, name, _ in named)
+    for path, name, case in named:
+        assert (ROOT / f"{path}.py").is_file(), path
+        if name:
+            marks = getattr(importlib.import_module(path.replace("/", ".")), name).pytestmark
+            [cases] = [m.kwargs.get("ids", m.args[1]) for m in marks if m.name == "parametrize"]
+            assert case in cases, (path, name, case)
