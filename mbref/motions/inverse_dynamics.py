@@ -234,6 +234,6 @@ def _refuse_missing(
         moved = [b.name for b, v in zip(scene.body, speeds, strict=True) if v > MOVES * speeds.max()]
         raise InputError(
             f"motors {', '.join(motors)}: cannot cause the motion at t = {t:.6g} s; with all of them at "
-            f"rest {', '.join(moved)} can still move: {each.freedoms} degrees of freedom, and motors for "
-            f"{each.rank}"
+            f"rest {', '.join(moved)} can still move: the motors hold {each.rank} of {each.freedoms} degrees "
+            "of freedom"
         )

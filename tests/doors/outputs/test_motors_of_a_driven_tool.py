@@ -273,7 +273,7 @@ def test_hand_of_a_gram_on_an_arm_of_a_hundred_kilograms_needs_its_own_motor():
 
 
 BARE = [body.model_copy(update={"mass": None, "inertia": None}) for body in arm().body]
-RESTING = "with all of them at rest left arm, right arm, right can still move: 2 degrees of freedom"
+RESTING = "left arm, right arm, right can still move: the motors hold 1 of 2 degrees of freedom"
 
 
 @pytest.mark.parametrize(
@@ -288,7 +288,8 @@ RESTING = "with all of them at rest left arm, right arm, right can still move: 2
     ],
 )
 def test_motors_that_cannot_cause_the_motion_are_refused(motors, changes, sentence):
-    """One motor for two degrees of freedom; unknown joints; nothing that motors could replace; no masses."""
+    """One motor for two degrees of freedom; an unknown joint; a motor named twice; a text in place of a list;
+    no drivers that motors could replace; no masses."""
     motion = mbref.simulate(arm().with_(**changes), times=[0.0, 0.01])
     with pytest.raises(mbref.InputError) as refusal:
         mbref.inverse_dynamics(motion, motors)
