@@ -83,11 +83,12 @@ def at_origin(kind: str, **fields) -> dict:
 
 def test_residuals_of_joints_are_displacements_and_angles_that_they_prevent():
     """The body has moved by (0.1, 0.2, 0.3) m and turned about one axis. A joint along z has residuals along
-    y, -x and z, and then about y, -x and z, as far as it prevents them."""
-    moved = (0.1, 0.2, 0.3)
+    y, -x and z (m), and then about y, -x and z (rad), as far as it prevents them; a fixed or spherical joint
+    has the axes of one along z. The quaternions q and -q are one rotation."""
+    moved, other_sign = (0.1, 0.2, 0.3), -about(X, 0.4)
     fixed, hinge = at_origin("fixed"), at_origin("revolute", axis=Z)
     assert residual(fixed, moved, about(Y, 0.4)) == pytest.approx([0.2, -0.1, 0.3, 0.4, 0.0, 0.0])
-    assert residual(fixed, moved, -about(X, 0.4))[3:] == pytest.approx([0.0, -0.4, 0.0])
+    assert residual(fixed, moved, other_sign)[3:] == pytest.approx([0.0, -0.4, 0.0])
     assert residual(hinge, moved, about(Z, 2.0)) == pytest.approx([0.2, -0.1, 0.3, 0.0, 0.0])
     assert residual(hinge, (0, 0, 0), about(Y, 2.0))[3:] == pytest.approx([2.0, 0.0])
     assert residual(at_origin("spherical"), moved, about(X, 1.0)) == pytest.approx([0.2, -0.1, 0.3])

@@ -66,8 +66,10 @@ def test_noise_in_one_stage_of_the_shortest_step_is_stepped_over() -> None:
 
 
 def test_noise_where_a_shortest_step_is_corrected_does_not_spoil_the_result() -> None:
-    """y' is 1, but 1e9 at the state to which the first, shortest step is corrected. Each correction adds
-    1e-9, so that y(1) is 1 plus 1e-9 for each step, to rounding."""
+    """y' is 1, but 1e9 at the state to which the first, shortest step is corrected. The change of slope by
+    the correction counts as an error of the step: the lengths of JUMPS are tried, each counts as a rejected
+    step, and a longer one misses the noise. Each correction adds 1e-9 to y, so that y(1) is 1 plus 1e-9 for
+    each step, to rounding."""
     shortest, moved = 1e-3, 1e-9
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
@@ -75,6 +77,7 @@ def test_noise_where_a_shortest_step_is_corrected_does_not_spoil_the_result() ->
 
     stepper = Adaptive(rhs, lambda t, y: y + moved, 1e-6, shortest, np.inf, Counts())
     y = stepper.advance(np.zeros(1), 0.0, 1.0)
+    assert stepper.counts.rejected == len(JUMPS), f"{stepper.counts}"
     assert abs(y[0] - 1.0 - moved * stepper.counts.steps) < 1e-12
 
 

@@ -49,7 +49,8 @@ def test_page_of_a_method_has_equations_use_limits_and_measurements(name):
 
 
 def test_new_formulation_appears_in_list_table_page_and_contents(monkeypatch, capsys):
-    """One entry in FORMULATIONS is enough."""
+    """One entry in FORMULATIONS is enough. As lm1, of which it is a copy, it fails on redundant rows and
+    handles singular mass matrices, the last two columns of the table."""
     about = FORMULATIONS["lm1"].about._replace(
         title="Thrown away", meaning="made by a test", formula="x", text="y", use="nothing", fails="all"
     )

@@ -52,8 +52,9 @@ def test_column_turned_has_the_four_bar_rotated_by_seven_tenths_of_a_radian() ->
     ],
 )
 def test_cell_shows_the_grade_and_the_error_of_a_run(record, text) -> None:
-    """Right ✓ up to 1e-8, close ≈ up to 1e-2, wrong ✗ above, ! ended early, – refused, ○ no record. A line of
-    the legend begins with each sign."""
+    """Right ✓ up to 1e-8, close ≈ up to 1e-2, wrong ✗ above, ! with the end of the run, – refused, ○ no
+    record; a line of the legend begins with each sign. Errors up to 1e-2 have one digit and a power of ten,
+    larger ones two decimals. An error below the bound of the truth's own error shows as below that bound."""
     assert shown(record) == text and text[0] in {sign[0] for sign in LEGEND}
 
 

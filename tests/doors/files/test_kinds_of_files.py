@@ -29,12 +29,10 @@ OPTIONS = {
     "gripper_coupled_by_springs.xml": ImportOptions(without=frozenset({"motors"})),  # one acts on a tendon
     "hold_floating.urdf": ImportOptions(hold=["base"]),
 }
-REFUSED = {
+UNSUPPORTED = {  # file: its element, and the option that leaves it out, if any
     "actuator_armature_on_a_ball.xml": "armature of 'd', which is no actuator of a hinge or slide",
     "ball_with_armature.xml": "armature of 'x'.*--without armature",
     "ball_with_damper.xml": "stiffness of joint 'x'.*--without springs",
-    "circle.urdf": "the joints form a circle",
-    "close_unknown.urdf": "no link, body, site or joint 'fd'; known: world",
     "fixed_tendon_spring.xml": "tendon 't', which is not a spring between two sites",
     "flexcomp.xml": "1 flexible body.*--without flexible-bodies",
     "floating_on_a_moving_link.urdf": "joint 'F': floats on link 'a', which is not the base of the file",
@@ -42,27 +40,31 @@ REFUSED = {
     "friction.urdf": "dry friction of 'A'.*--without friction",
     "frictionloss.xml": "dry friction of 'B'.*--without friction",
     "gravcomp.xml": "compensation of the weight of b.*--without gravity-compensation",
-    "mimic_of_a_fixed_joint.urdf": "joint 'C' mimics 'A': the file has no such joint that moves",
-    "missing_mesh_inertia.xml": "body 'link2': its inertia follows from the shape 'link2', whose file",
     "motor_of_tendon.xml": "actuator 's', which acts on no single hinge or slide.*--without motors",
     "motor_with_filter.xml": "actuator 0, whose input changes over time",
-    "negative_mass.urdf": "link 'a': its mass must not be negative, got -1",
-    "no_inertia.urdf": "joint 'A': its bodies have no inertia about or along its axis",
-    "parallel_slides.xml": "body 'a': joints slide, slide in a row have dependent motions",
     "plastic_spring.xml": "plastic spring of joint 'B'.*--without springs",
     "site_transmission.xml": "actuator 0, which acts on no single hinge or slide",
     "slack_tendon.xml": "tendon 't', whose spring is slack over a range.*--without springs",
     "spatial_tendon_equality.xml": "type tendon, of a tendon that no fixed sum of joint coordinates gives",
     "stiffness_arrays.xml": "polynomial springs of joint 'A'.*polynomial damping of joint 'A'",
-    "straight_without_gravity.xml": "closure 'e': cannot be closed from this pose; the least gap found",
     "tendon_armature.xml": "armature of tendons t.*--without armature",
     "tendon_limits_and_friction.xml": "friction of tendons t.*--without friction",
     "tendon_through_a_pulley.xml": "tendon 's', which is not a spring between two sites",
+    "xacro_macro.urdf": "element <xacro:macro>: is a macro of xacro; write the URDF with",
+    "xacro_property.urdf": r"<mass value='\$\{m\}'>: is an expression of xacro",
+}
+FAULTY = {  # file: its fault
+    "circle.urdf": "the joints form a circle",
+    "close_unknown.urdf": "no link, body, site or joint 'fd'; known: world",
+    "mimic_of_a_fixed_joint.urdf": "joint 'C' mimics 'A': the file has no such joint that moves",
+    "missing_mesh_inertia.xml": "body 'link2': its inertia follows from the shape 'link2', whose file",
+    "negative_mass.urdf": "link 'a': its mass must not be negative, got -1",
+    "no_inertia.urdf": "joint 'A': its bodies have no inertia about or along its axis",
+    "parallel_slides.xml": "body 'a': joints slide, slide in a row have dependent motions",
+    "straight_without_gravity.xml": "closure 'e': cannot be closed from this pose; the least gap found",
     "two_parents.urdf": "link 'c': is the child of two joints, 'C' and 'D'",
     "two_roots.urdf": "links 'base', 'stray': no joint carries them",
     "unknown_link.urdf": "joint 'C': its parent link 'nothing' is not in the file",
-    "xacro_macro.urdf": "element <xacro:macro>: is a macro of xacro; write the URDF with",
-    "xacro_property.urdf": r"<mass value='\$\{m\}'>: is an expression of xacro",
 }
 ROWS_OF_OUR_OWN = ("close", "mimic")  # MuJoCo reads none from a URDF; see test_robot_files.py
 SLOW = (  # 1 to 16 s
@@ -70,7 +72,7 @@ SLOW = (  # 1 to 16 s
     *("hand_of_tendons.xml", "kangaroo_leg.xml", "leg_with_shin_spring.xml", "stewart.xml"),
     *("stewart_with_cylinders.xml", "wheel_with_gearbox.xml"),
 )
-READ = sorted(path.name for path in KINDS.iterdir() if path.name not in REFUSED)
+READ = sorted(path.name for path in KINDS.iterdir() if path.name not in UNSUPPORTED | FAULTY)
 
 
 def found(name: str) -> Source:
@@ -91,12 +93,12 @@ def test_imported_scene_moves_as_mujoco_s_model_of_the_file(name):
     assert apart(read_file.original, read_file, END, read_file.original.nkey - 1) < SAME
 
 
-@pytest.mark.parametrize("name", sorted(REFUSED))
-def test_file_with_an_unsupported_element_is_refused_with_the_element_s_name(name):
-    """REFUSED gives each file's element and, if it may be left out, the option ``--without``."""
+@pytest.mark.parametrize(("name", "said"), (UNSUPPORTED | FAULTY).items(), ids=UNSUPPORTED | FAULTY)
+def test_file_with_an_unsupported_element_or_a_fault_is_refused_with_its_name(name, said):
+    """The tables give the words of the refusal, which name the part that is the cause."""
     with pytest.raises(SceneError) as refusal:
         found(name)
-    assert re.search(REFUSED[name], " ".join(str(refusal.value).split()))
+    assert re.search(said, " ".join(str(refusal.value).split()))
 
 
 @pytest.mark.parametrize("name", [n for n in READ if n.endswith(".urdf") and "mimic" not in n])

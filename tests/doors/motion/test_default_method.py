@@ -54,9 +54,9 @@ def test_default_crosses_the_singular_position_of_14_loops_as_their_closed_form(
     assert np.abs(run.position - truth).max() < 1e-6  # m; a thousand tolerances of the steps
 
 
-BOTH = ("alf-dual+projection", "taylor")
+BOTH = (SPARSE, "taylor")
 RTOL = 1e-8
-CLOSE = 10 * RTOL  # m, in mechanisms of 40 m
+CLOSE = 10 * RTOL  # m, in mechanisms of 10 to 40 m
 
 
 @pytest.mark.parametrize("method", BOTH)
@@ -70,11 +70,11 @@ def test_41_loops_move_as_their_closed_form_by_sparse_matrices_and_by_taylor_ser
 
 @pytest.mark.parametrize("name", ["sarrus_stack[12]", "sarrus_stack[30]"])
 def test_sparse_matrices_and_taylor_series_move_a_stack_of_spatial_loops_alike(name):
-    """A stack has no closed form: the methods share neither equations nor integrator, and the judge finds
-    that each motion satisfies the constraints (m) and loses no energy, relative to the kinetic energy."""
+    """A stack has no closed form: SPARSE and taylor share neither equations nor integrator. The judge finds
+    the violation of constraints (of the length, or rad) and the drift of energy (of the largest energy)."""
     scene, times = find_scene(name), [0.0, 0.05]
     runs = [simulate(scene, method, times, Limits(rtol=RTOL)) for method in BOTH]
     assert [run.outcome.name for run in runs] == ["COMPLETED"] * 2, [run.message for run in runs]
     assert np.abs(runs[0].position - runs[1].position).max() < CLOSE
     found = [measure(scene, run) for run in runs]
-    assert all(each["violation_position"] < CLOSE and each["energy_error"] < RTOL for each in found), found
+    assert all(max(each["violation_position"], each["energy_error"]) < RTOL for each in found), found

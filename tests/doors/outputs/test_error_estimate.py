@@ -46,7 +46,8 @@ def oscillator() -> Scene:
 
 @pytest.fixture(scope="module")
 def dead() -> Scene:
-    """A driven crank of 0.5 m that cannot turn: the other bars reach 0.5 m + 0.5 m, to a hinge at 1.2 m."""
+    """A driven crank of 0.5 m that cannot turn to the far side of the last hinge, 1.2 m away: the other bars
+    reach 0.5 m + 0.57 m, less than 1.2 m + 0.5 m."""
     bars = linkage("dead", [(0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (0.8, 0.4, 0.0), (1.2, 0.0, 0.0)])
     return bars.with_(duration=1.0, driver=(Driver(joint="P0", polynomial=(0.0, 2.0)),))
 
@@ -157,8 +158,8 @@ def test_start_of_the_second_run_differs_by_rounding_and_keeps_zeros(pendulums):
 
 
 def test_samples_that_the_second_run_does_not_reach_have_no_estimate(dead):
-    """The driven motion ends at a dead position before its 101 samples are reached; three samples at t ≥ 2 s
-    are added to it."""
+    """The driven motion ends at a dead position before its 101 samples are reached. Its last state is
+    appended three times, at 2, 3 and 4 s."""
     motion = with_error_estimate(simulate(dead))
     assert 2 < len(motion.times) < 101 and not np.isnan(motion.error_estimate.error).any()
     last = np.repeat([len(motion.times) - 1], 3)
