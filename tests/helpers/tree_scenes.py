@@ -60,7 +60,8 @@ LOADS = (
 
 
 def every_joint(**changes) -> Scene:
-    """Every joint and load kind; two loops, one closed by a distance joint, one by a spherical joint."""
+    """Seven types of joints (not planar, inline, free), springs, a torsion spring, a force and a moment; two
+    loops, one closed by a distance joint, one by a spherical joint."""
     parts = {"body": BODIES, "joint": JOINTS, "load": LOADS}
     return Scene(name="every_joint", gravity=(0.3, -9.81, 1.0), duration=0.4, **parts).with_(**changes)
 
