@@ -5,10 +5,7 @@ import pytest
 
 import mbref
 from crosscheck.engine import engine
-from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.metrics import measure
-from crosscheck.judge.reference.taylor import natural_motion
-from crosscheck.judge.reference.tree import tree_motion
 from crosscheck.judge.truth import truth_for
 from mbref.scene import Scene
 from tests.helpers.parts import Z, joint
@@ -54,16 +51,6 @@ def test_a_body_on_a_wire_through_its_centre_slides_as_on_an_incline():
 
 
 @each
-def test_both_formulations_of_the_reference_agree_on_inline_joints(scene):
-    """Natural coordinates and a tree of joints, both integrated in long doubles, give positions and
-    accelerations that differ by less than 1e-13 m, m/s² or rad/s²."""
-    a, b = (motion(scene, TIMES, EXTENDED, seconds=60.0) for motion in (natural_motion, tree_motion))
-    assert not a.reason and not b.reason
-    for field in ("position", "acceleration", "angular_acceleration"):
-        assert np.abs(doubles(getattr(a, field) - getattr(b, field))).max() < ROUNDING, field
-
-
-@each
 @pytest.mark.parametrize(
     ("name", "family", "allowed"), [("mujoco", "projected", 1e-8), ("exudyn", "tuned", 1e-6)]
 )
@@ -74,13 +61,6 @@ def test_engine_moves_an_inline_joint_as_the_reference(scene, name, family, allo
     run = found.run(scene, TIMES, found.settings_of(scene, family)[-1])
     errors = measure(scene, run, truth_for(scene))
     assert errors["error"] < allowed, errors
-
-
-@pytest.mark.parametrize("name", ["pinocchio", "simbody", "ondsel", "sundials"])
-def test_engines_without_inline_joints_refuse_them_by_their_type(name):
-    """The scene is a bead on a wire of the ground."""
-    refusal = engine(name).cannot(SCENES["wire on the ground"])
-    assert refusal is not None and "inline" in refusal.reason
 
 
 def test_an_inline_joint_in_place_of_a_second_bearing_leaves_fewer_redundant_rows():
