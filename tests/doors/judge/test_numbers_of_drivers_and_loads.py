@@ -139,16 +139,6 @@ def test_angles_of_a_reference_count_full_turns_whatever_samples_are_asked_for(t
     assert table["energy"] == pytest.approx(50.0, abs=1e-9)
 
 
-def test_angles_without_their_full_turns_are_explained_as_such() -> None:
-    """φ = 10 sin t rad is right; wrapped to -π … π it is off."""
-    times = np.array([1.0, 2.0, 5.0, 8.0])
-    angle = 10 * np.sin(times)
-    assert crosscheck.judge_motion(wound_disc(), {"time": times, "A.angle": angle}).is_right
-    wrapped = {"time": times, "A.angle": np.angle(np.exp(1j * angle))}
-    (cause,) = crosscheck.judge_motion(wound_disc(), wrapped).explanations
-    assert cause.sentence == "A.angle: full turns are not counted (angles between -π and π)"
-
-
 def torque_of_a(length: float, driven_joints: str) -> float:
     """Return the torque of the driver of A (N m) on a parallelogram with drivers at the named joints."""
     drivers = [Driver(joint=name, polynomial=(0.0, 1.0, 2.0)) for name in driven_joints]

@@ -83,18 +83,6 @@ def test_both_formulations_of_a_reference_confirm_each_other_at_every_sample(nam
     assert referred(scene, times_of(scene)).both.all()
 
 
-@pytest.mark.parametrize("name", a_few(CLOSED, 3))
-def test_reference_agrees_with_the_closed_form_within_its_bound(name):
-    """The closed form has an accuracy of its own, which is added."""
-    scene = MOTIONS[name]()
-    found, exact = referred(scene, times_of(scene)), closed_form(scene).poses(times_of(scene))
-    assert found.both.all()
-    allowed = found.bound.max() + closed_form(scene).accuracy
-    length = constraints.scene_length(scene)
-    assert np.linalg.norm(found.position - exact.position, axis=-1).max() <= allowed * length
-    assert turned_between(found.orientation, exact.orientation).max() <= allowed
-
-
 @pytest.mark.parametrize("name", a_few(SMOOTH, 25, 3))
 def test_states_of_a_reference_do_not_depend_on_other_samples(name):
     """The judge's states at the stored times equal the stored ones, though it is asked for six more times."""
