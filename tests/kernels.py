@@ -21,8 +21,7 @@ METHODS = (
 
 
 def prepare(backwards: bool = False) -> None:
-    """Compile or load the kernels of METHODS and of the series. Processes that begin at the two ends share
-    the work."""
+    """Compile or load kernels of METHODS and the series. Processes from both ends share the work."""
     general = dict.fromkeys(kernel for name in METHODS for kernel in kernels_of(Method.parse(name)))
     # rates_and_balance: runs by a sparse formulation with redundant rows, without projection
     kernels = [*general, *KERNELS_OF_SERIES, follow_drivers, rates_and_balance]

@@ -49,8 +49,7 @@ def test_singular_value_counts_only_above_the_tolerance(least):
 
 
 def test_contradicting_equations_have_the_least_squares_solution():
-    """Each equation is there twice with different right-hand sides; NumPy's pseudo-inverse takes their mean,
-    to rounding."""
+    """Each equation is there with two right-hand sides; NumPy's pseudo-inverse takes their mean."""
     matrix = np.vstack([unit_rows(1, 4, 6, [1.0] * 4)] * 2)
     assert difference(matrix, np.random.default_rng(1).normal(size=8)) < ROUNDING
 
@@ -72,8 +71,7 @@ def test_tolerance_is_relative_to_the_largest_singular_value():
 
 @pytest.mark.parametrize("seed", range(5))
 def test_basis_of_a_null_space_depends_on_the_space_alone(seed):
-    """Equations in another order, combined with each other, have the basis of the first ones, to rounding. It
-    is orthonormal."""
+    """Combined equations in another order have the basis of the first ones; it is orthonormal."""
     random = np.random.default_rng(seed)
     matrix = random.normal(size=(4, 9))
     basis = null_space(matrix, TOLERANCE)

@@ -1,5 +1,4 @@
-"""Pairs of scenes of one structure whose numbers decide which constraint rows are independent, and all
-numbers of a run."""
+"""Pairs of scenes whose numbers decide which rows are independent, and all numbers of a run."""
 
 from mbref.motions.motion import Motion
 from mbref.scene import Body, Force, Revolute, Scene, Spring, Translational

@@ -80,8 +80,7 @@ def _wound(load, rng: Rng):
 
 
 def _periodic(load, rng: Rng):
-    """Return the load; half of the loads over time also follow a periodic table, which begins before the
-    start."""
+    """Return the load; half of the loads over time follow a periodic table from before the start."""
     if not getattr(load, "factor", None) or rng.random() < 0.5:
         return load
     times, (a, b, c) = DURATION * (np.arange(4) / 3 - 8 / 3), rng.uniform(-1.0, 1.0, 3)
@@ -92,8 +91,7 @@ def _periodic(load, rng: Rng):
 
 
 def _summed(scene: Scene, rng: Rng) -> Scene:
-    """Return the scene with a coupling that sums three or four coordinates; without it if no motion
-    remains."""
+    """Return the scene with a coupling that sums 3 or 4 coordinates; without it if no motion remains."""
     ends = [(joint.name, kind) for joint in scene.joint for kind in joint.facts.coordinates]
     for _ in range(TRIES if len(ends) > 2 else 0):
         joints, kinds = zip(*rng.permutation(ends)[: rng.integers(3, 5)].tolist(), strict=True)
@@ -106,8 +104,7 @@ def _summed(scene: Scene, rng: Rng) -> Scene:
 
 
 def _moves(scene: Scene, less: Scene) -> bool:
-    """Return whether the row of another coupling or driver leaves a motion, and is independent of the
-    others."""
+    """Return whether another coupling's or driver's row leaves a motion and is independent of others."""
     values, before = singular_values(scene), rank(less)
     return rank_of(values) == before + 1 and values[before] > REGULAR and goes_on(scene)
 

@@ -9,8 +9,7 @@ FIRST, SECOND = DIFFICULTIES[:2]
 
 
 def measured(error: float | None, family: str = "tuned", engine: str = "mujoco", **changes: Any) -> dict:
-    """Return the record of a run with an error; one with another outcome than COMPLETED ends at 0.3 s of 1
-    s."""
+    """Return the record of a run with an error; if its outcome is not COMPLETED it ends at 0.3 s of 1 s."""
     is_whole = changes.get("outcome", "COMPLETED") == "COMPLETED"
     record = {"scene": FIRST.scene, "engine": engine, "family": family, "version": "4.0.0"}
     record |= {"outcome": "COMPLETED", "message": "" if is_whole else "the Jacobian is singular"}

@@ -90,8 +90,7 @@ def test_file_has_a_docstring_of_more_than_ten_characters():
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_public_function_and_class_has_a_docstring(package):
-    """Functions and classes of a module, not those inside others. Kernels of methods have theirs on the base
-    class."""
+    """Functions and classes of a module itself. Kernels of methods have theirs on the base class."""
     kernels = {"accelerate", "enter", "rates", "accept", "step", "propose"}  # contract on the base class
     silent = [
         f"{name(path)}: {node.name}"
@@ -183,8 +182,7 @@ def test_slow_tests_are_left_out_by_default_and_run_by_make_deep():
 
 
 def test_list_of_slow_cases_names_existing_tests():
-    """More than 50 files are listed. The cases themselves are checked by conftest.py when all tests are
-    collected."""
+    """More than 50 files are listed. conftest.py checks the cases when all tests are collected."""
     listed = tomllib.loads((ROOT / "tests" / "slow.toml").read_text())
     assert len(listed) > 50
     for file, tests in listed.items():
@@ -194,8 +192,7 @@ def test_list_of_slow_cases_names_existing_tests():
 
 
 def test_constraints_pin_exact_versions_without_addresses():
-    """A line is NAME==VERSION, perhaps with a condition on the platform; comments and blank lines are left
-    out."""
+    """A line is NAME==VERSION, perhaps for a platform; comments and blank lines are left out."""
     lines = [
         line for line in (ROOT / "constraints.txt").read_text().splitlines() if line[:1] not in ("#", "")
     ]

@@ -38,8 +38,7 @@ def test_half_of_the_functions_have_at_most_7_lines_and_nine_tenths_at_most_20(p
 
 
 def test_lines_of_a_body_are_counted_without_its_docstring(tmp_path):
-    """A function with a docstring of three lines, a statement, a blank line and another statement has
-    three."""
+    """A docstring of three lines, a statement, a blank line and another statement are three."""
     path = tmp_path / "code.py"
     path.write_text('def f():\n    """Says.\n\n    More."""\n    a = 1\n\n    return a\n')
     assert sizes([path]) == {"code.py:1 f": 3}

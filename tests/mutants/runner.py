@@ -171,8 +171,7 @@ def _enter(place: Path, folder: Path, limit: float) -> None:
 
 
 def _wait(child: int, end: float) -> tuple[int, float]:
-    """Return the status with which a fork ends, and its CPU s; it is killed at the end, and its children in
-    any case."""
+    """Return status and CPU s of a fork; it is killed at the end, its children in any case."""
     ended = 0
     while not ended:
         ended, status, used = os.wait4(child, os.WNOHANG)

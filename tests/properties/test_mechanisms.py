@@ -40,8 +40,7 @@ def run(scene: Scene, samples: int = 3) -> Trajectory:
 
 
 def state(motion: Trajectory, k: int) -> tuple[np.ndarray, ...]:
-    """Return positions, orientations, velocities and angular velocities at a sample, without torsion
-    springs."""
+    """Return positions, orientations and both velocities at a sample, without torsion springs."""
     return (
         motion.position[k],
         motion.orientation[k],

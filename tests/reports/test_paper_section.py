@@ -217,8 +217,7 @@ def test_accelerations_of_exact_records_have_all_digits_and_a_failed_start_has_n
 
 
 def test_every_figure_is_drawn_and_curves_over_time_run_forwards(blocks):
-    """More than four figures have an axis of times. All motions last 0.01 s or more: violations on this axis
-    would be smaller."""
+    """More than four figures have times on an axis: violations there would be below 0.01 s."""
     drawn = {block.name: block.draw() for block in blocks if isinstance(block, Figure)}
     for number in (4, 5, 6, 8, 11, 12, 13, 14, 15, 16):
         assert f"paper-figure-{number}" in drawn, f"Figure {number} is missing of {list(drawn)}"

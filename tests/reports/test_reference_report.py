@@ -20,8 +20,7 @@ def groups() -> list[SceneRuns]:
 
 
 def test_sections_of_the_committed_report_follow_from_the_stored_records(groups):
-    """Each of more than 100 blocks stands in report.md. The section on reactions takes longest: the slow test
-    below renders it."""
+    """Each of more than 100 blocks stands in report.md. The slow test below renders reactions."""
     text = (FOLDER / "report.md").read_text()
     names = [name for name in sections.NAMES if name != "reactions"]
     blocks = sections.blocks(groups, names, stored.verified(FOLDER))

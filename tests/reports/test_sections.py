@@ -194,8 +194,7 @@ def test_outcome_table_shows_outcome_and_end_time_of_each_run():
 
 
 def test_failure_marks_are_explained_with_outcome_and_message():
-    """Mark 1 stands for two runs of Exudyn that did not converge, mark 2 for a run of Pinocchio that crashed
-    at the start."""
+    """Mark 1: two runs of Exudyn that did not converge; mark 2: Pinocchio crashed at the start."""
     found = table(speed.render(groups()[0]), "Mark")
     assert [row[:5] for row in found.rows] == [
         ("1", "exudyn", "tuned", "2", "NOT_CONVERGED"),

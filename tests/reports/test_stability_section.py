@@ -28,8 +28,7 @@ def record(ladder, difficulty, error, outcome="COMPLETED", engine="mbref", famil
 
 
 def test_name_of_a_scene_of_a_stability_ladder_states_its_ladder_and_difficulty():
-    """A ladder is a mechanism at several difficulties, more than 60 scenes together. Each has a closed
-    form."""
+    """A ladder is a mechanism at several difficulties, 60 scenes or more. Each has a closed form."""
     scenes = stability.scenes()
     assert len(scenes) == sum(len(ladder.rungs) for ladder in stability.ladders()) > 60
     for scene in scenes:

@@ -60,8 +60,7 @@ def test_check_of_a_law_fails_on_one_body_with_a_planted_defect_and_passes_witho
 
 
 def test_every_check_has_a_defect_that_it_detects():
-    """tests/zoo/defects.toml names each check of the suite. The first test of this file shows the
-    detection."""
+    """tests/zoo/defects.toml names each check of the suite; the first test here shows the detection."""
     idle = {*suite.FIRST, *PROPERTIES} - {defect.check for defect in DEFECTS.values()}
     assert not idle, f"no defect of the zoo trips {sorted(idle)}"
 

@@ -51,8 +51,7 @@ def test_defect_is_reported_where_its_remedy_mends_the_accelerations():
     ids=["remedy changes nothing", "remedy makes it wrong", "other version", "no loop", "no hinge"],
 )
 def test_no_defect_is_reported_without_improvement_or_where_its_conditions_fail(options, remedy, conditions):
-    """Factors multiply gravity, so that 1 is right. The engine has the version 1.0, and the stone has neither
-    loops nor joints."""
+    """Factors multiply gravity: 1 is right. The engine is version 1.0; the stone has no loops or joints."""
     assert said(options, remedy, **conditions) == []
 
 

@@ -49,8 +49,7 @@ def test_run_s_table_shows_a_name_literally(name: str, capsys: pytest.CaptureFix
     ],
 )
 def test_name_of_no_scene_and_no_file_is_refused_in_one_line(name, says, capsys: pytest.CaptureFixture[str]):
-    """The message is shorter than 700 characters, also for a name of 5000; `mbref diagnose` ends with status
-    2."""
+    """Messages have less than 700 characters, also for a name of 5000; the status is 2."""
     assert main(["diagnose", name]) == 2
     said = capsys.readouterr().err
     assert says in said and said.count("\n") == 1 and len(said) < 700

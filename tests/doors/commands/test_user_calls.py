@@ -33,8 +33,7 @@ def test_duration_gives_a_run_101_samples_up_to_its_end(saved):
 
 
 def test_argument_rtol_of_simulate_equals_rtol_of_limits(saved):
-    """A tolerance of 1e-10 takes more steps than 1e-3; either way of giving it leads to one motion, to the
-    bit."""
+    """A tolerance of 1e-10 takes more steps than 1e-3; both ways of giving it lead to equal bits."""
     loose, fine = (mbref.simulate(saved, "lm1+none", [2.0], rtol=rtol) for rtol in (1e-3, 1e-10))
     assert fine.cost.steps > loose.cost.steps, "the tolerance was not taken"
     same = mbref.simulate(saved, "lm1+none", [2.0], mbref.Limits(rtol=1e-10))
@@ -71,7 +70,6 @@ def test_motion_is_saved_as_json_only(saved, tmp_path):
     ],
 )
 def test_times_of_simulate_that_are_no_samples_are_refused(times, says):
-    """No time, a list of lists, times that do not increase, negative and missing ones, texts, and a number
-    beyond doubles."""
+    """No time, lists of lists, times that fall, negative and missing ones, texts, a huge number."""
     with pytest.raises(InputError, match=f"^times: {says}$"):
         mbref.simulate("four_bar", times=times)

@@ -176,8 +176,7 @@ def sentence(scene, tilt: float = 0.0, **changes) -> str:
 
 
 def test_verdict_on_a_files_own_settings_states_errors_and_the_opening_of_closures(tmp_path):
-    """The run of `sentence` is off by 20 mm and 0.03 rad, and its closure is open by 1.2 mm: a tenth of it,
-    rounded, is 0.1 mm."""
+    """The run is off by 20 mm and 0.03 rad, its closure open by 1.2 mm: a tenth, rounded, is 0.1 mm."""
     assert sentence(imported(tmp_path, FOUR_BAR, TILTED)) == (
         "robot at its own settings (time step 0.004 s, Euler, solref 0.03 1) is wrong: bodies are off by "
         "up to 20 mm and 0.03 rad, and its closures open by up to 1.2 mm. `crosscheck tune mujoco "

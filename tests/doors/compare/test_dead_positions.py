@@ -49,8 +49,7 @@ def test_singular_positions_of_a_driven_four_bar_are_no_dead_positions():
 @pytest.mark.slow  # each a reference of 2 CPU s; references end at dead positions in the tests below
 @pytest.mark.parametrize("name", ["turned", "pushed"])
 def test_comparison_with_even_samples_is_shortened_to_end_just_before_the_dead_position(name):
-    """It keeps the number of 41 even samples. "Just before" means here within the last 5 % of the closed
-    form's time."""
+    """It keeps 41 even samples. "Just before" means within the last 5 % of the closed form's time."""
     scene, time = MADE[name]
     shorter = followed(scene, np.linspace(0.0, scene.duration, 41), SECONDS)
     assert shorter.dead == pytest.approx(time, rel=ACCURACY)
@@ -59,8 +58,7 @@ def test_comparison_with_even_samples_is_shortened_to_end_just_before_the_dead_p
 
 @pytest.mark.slow
 def test_comparison_with_uneven_samples_keeps_the_samples_before_the_dead_position_if_any():
-    """If no sample is before it, the comparison ends at the requested samples and reports no dead
-    position."""
+    """If no sample is before it, all requested samples are compared and no dead position is reported."""
     scene, time = MADE["pushed"]
     uneven = followed(scene, np.array([0.1 * time, 0.5 * time, 2.0 * time]), SECONDS)
     assert np.array_equal(uneven.times, [0.1 * time, 0.5 * time])
@@ -70,8 +68,7 @@ def test_comparison_with_uneven_samples_keeps_the_samples_before_the_dead_positi
 
 @pytest.mark.slow  # runs of an engine and a reference: 5 CPU s
 def test_engine_is_judged_up_to_the_dead_position_and_the_verdict_states_its_time():
-    """OndselSolver is right up to there. The closed form gives the time; the headline states it with four
-    digits."""
+    """OndselSolver is right up to the closed form's time; the headline has four digits of it."""
     scene, time = MADE["pushed"]
     found = crosscheck.compare(scene, "ondsel", reference_time=SECONDS)
     assert found.difference is None and found.judged.differences == {}

@@ -38,8 +38,7 @@ def test_run_without_samples_has_no_metric_and_an_infinite_opening(scene: Scene)
 
 
 def test_comparison_reports_an_engine_that_crashes_before_its_first_sample():
-    """The engine raises an error in each run. It has a row, a sentence of the verdict and a record, all in
-    JSON without NaN."""
+    """Each run raises an error, and has a row, a sentence and a record, in JSON without NaN."""
     scene = arms(1.0, coupled=True).with_(duration=0.1)
     found = crosscheck.compare(scene, FAILING, samples=3, reference_time=1.0)
     assert [row["outcome"] for row in found.rows] == ["CRASHED"] and found.rows[0]["error"] is None

@@ -116,8 +116,7 @@ def test_process_pool_gives_the_records_of_a_serial_study(one_after_the_other: l
 
 
 def test_run_in_a_child_gives_the_record_of_a_run_here():
-    """Records are equal except for times, and for mbref's estimate of its error, which only the child of a
-    study makes."""
+    """Records are equal except for times and mbref's error estimate, which only a child makes."""
     wanted = Case(SCENES["four_bar"](), TIMES, "mbref", Setting("mpi-svd+projection", {"rtol": 1e-6}))
     here, child = untimed([run_here(wanted)]), untimed([run_case(wanted)])
     assert here[0].pop("error_estimate") is None and child[0].pop("error_estimate")["largest"] > 0
@@ -126,8 +125,7 @@ def test_run_in_a_child_gives_the_record_of_a_run_here():
 
 @pytest.mark.slow
 def test_cluster_of_two_workers_gives_the_records_of_a_serial_study(one_after_the_other, tmp_path):
-    """Records are returned and stored; except for times and seconds they equal the records of one thread
-    here."""
+    """Returned and stored records equal those of one thread here, except for times and seconds."""
     from distributed import Client, LocalCluster
 
     path = tmp_path / "records.jsonl"

@@ -1,5 +1,4 @@
-"""The judge's derivatives of accelerations at a state keep their symmetries, and follow frames, units and the
-order of bodies."""
+"""The judge's derivatives at a state keep symmetries, and follow frames, units and orders."""
 
 from functools import cache
 

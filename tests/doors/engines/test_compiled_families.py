@@ -235,8 +235,7 @@ def test_a_failed_run_of_mujocos_compiled_family_has_the_samples_before_its_end(
 def test_mujocos_projected_compiled_family_gives_the_true_motion_through_singular_positions(
     name, rtol, shortest, measured
 ):
-    """The error from the judge's truth is at most ten times the measured one; joints are closed to 1e-12 of
-    the length."""
+    """Errors are at most ten times the measured ones; joints are closed to 1e-12 of the length."""
     pytest.importorskip("mujoco")
     scene = SCENES[name]()
     run = simulate("mujoco", scene, 11, PROJECTED, rtol=rtol, min_step=shortest, beta=0.0, hard=1e-9)
@@ -329,8 +328,7 @@ def pinocchio() -> Engine:
     ],
 )
 def test_pinocchios_compiled_family_gives_the_true_motion(pinocchio: Engine, name, rtol, shortest, measured):
-    """The error from the judge's truth is at most ten times the measured one; joints are closed to 1e-12 of
-    the length."""
+    """Errors are at most ten times the measured ones; joints are closed to 1e-12 of the length."""
     scene = SCENES[name]()
     run = simulate("pinocchio", scene, 11, "tuned, compiled", rtol=rtol, min_step=shortest)
     assert error_of(scene, run) < MARGIN * measured

@@ -1,5 +1,4 @@
-"""Couplings, their offsets, and armatures: engines and mbref move as the judge's reference, or refuse
-them."""
+"""Couplings, offsets and armatures: engines and mbref move as the judge's reference, or refuse."""
 
 import numpy as np
 import pytest

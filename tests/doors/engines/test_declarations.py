@@ -1,5 +1,4 @@
-"""Adapters refuse joints, drivers and loads that they do not declare. The rows of a joint type are equally
-many in all equations."""
+"""Adapters refuse what they do not declare. A joint type has as many rows in all equations."""
 
 from typing import Literal
 

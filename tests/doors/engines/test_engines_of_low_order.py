@@ -30,8 +30,7 @@ def failures(step: Step, scenes: list[str], fault: str = "") -> list[str]:
 @pytest.mark.parametrize("step", [euler, symplectic_euler, midpoint])
 @pytest.mark.parametrize("scene", RUNS)
 def test_engine_of_low_order_with_right_equations_violates_no_check(step: Step, scene: str):
-    """Euler's methods have order 1, the midpoint method order 2. Errors of their steps are not reported as
-    faults."""
+    """Euler's methods have order 1, the midpoint method 2. Errors of their steps are no faults."""
     assert failures(step, [scene]) == []
 
 

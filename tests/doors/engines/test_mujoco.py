@@ -38,8 +38,7 @@ def simulate(scene: Scene, duration: float, family: str, **options) -> Trajector
     ],
 )
 def test_tuned_mujoco_stays_within_its_measured_error_of_the_truth(name, duration, step, beta, measured):
-    """RK4 with hard closures ("tuned"). The error from the judge's truth is at most ten times the measured
-    one."""
+    """RK4 with hard closures ("tuned"). Errors from the truth are at most ten times the measured ones."""
     scene = SCENES[name]()
     run = simulate(scene, duration, "tuned", step=step, beta=beta, hard=HARD)
     assert completed_error(run, scene) < MARGIN * measured
@@ -150,8 +149,7 @@ def test_projected_mujoco_crosses_singular_positions_within_its_measured_error()
 
 
 def test_projected_mujoco_follows_the_driven_crank() -> None:
-    """The error from the closed form of the driven slider-crank is at most ten times the measured 3.9e-13 m
-    or rad."""
+    """The error from the closed form is at most ten times the measured 3.9e-13 m or rad."""
     scene = SCENES["spatial_slider_crank_driven"]()
     run = simulate(scene, 0.1, "projected", rtol=1e-8, min_step=1e-4, beta=600.0, hard=ADAPTIVE["projected"])
     assert completed_error(run, scene) < MARGIN * 3.9e-13

@@ -77,8 +77,7 @@ def test_solvers_that_need_a_constraint_do_not_serve_a_free_body():
 @pytest.mark.slow
 @pytest.mark.parametrize(("family", "measured"), ERRORS.items())
 def test_newton_s_solver_moves_a_four_bar_within_its_measured_error(family, measured):
-    """Errors over 0.2 s, at steps of 1 ms, are from the judge's truth and over the length; 1.5 times the
-    measured one is allowed."""
+    """Errors over 0.2 s at steps of 1 ms, over the length; 1.5 times the measured one is allowed."""
     assert 0 < error_of_four_bar(family) < MARGIN * measured
 
 

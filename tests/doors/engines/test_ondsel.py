@@ -163,8 +163,7 @@ CORD = Distance(name="cord", bodies=("crank", "sled"), anchors=((0.3, 0.0, 0.0),
     ids=["distance joint", "no driver", "driven from a position with two branches"],
 )
 def test_ondsel_refuses_what_the_library_cannot_move(scene: Scene, says: str) -> None:
-    """The library's own limits, of which the refusal has a word: Owner.ENGINE is the library, not the
-    adapter."""
+    """The refusal has a word of the library's own limit; Owner.ENGINE is the library, not the adapter."""
     refusal = engine("ondsel").cannot(scene)
     assert refusal is not None and refusal.owner is Owner.ENGINE and says in refusal.reason, refusal
 

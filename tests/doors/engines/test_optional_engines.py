@@ -24,8 +24,7 @@ def nothing_more(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_optional_engines_without_their_packages_are_not_run_by_default(nothing_more: None) -> None:
-    """The optional engines stay known by name; a command that names no engine runs the built-in ones, and no
-    notice names them."""
+    """They stay known by name; without a name the built-in ones run, and no notice names the others."""
     assert set(OPTIONAL) <= set(engine_names()), f"known: {engine_names()}"
     assert not any(map(installed, OPTIONAL)), f"installed: {[n for n in OPTIONAL if installed(n)]}"
     assert default_engines()[: len(BUILT_IN)] == BUILT_IN and not set(OPTIONAL) & set(default_engines())
@@ -45,8 +44,7 @@ def test_request_for_a_missing_engine_names_the_package_to_install(nothing_more:
 
 @pytest.mark.parametrize("name", OPTIONAL + ON_REQUEST)
 def test_installed_engines_run_by_default_except_those_on_request(name: str, monkeypatch) -> None:
-    """Every package has a version, so that it counts as installed. Engines on request compile code for each
-    scene, or are large."""
+    """Every package counts as installed. Engines on request compile code, or are large."""
     monkeypatch.setattr(metadata, "version", lambda package: "1.0")
     assert installed(name) and (name in default_engines()) == (name in OPTIONAL)
 

@@ -29,8 +29,7 @@ GRAVITY = (1.0, -8.0, -5.0)  # m/s²
 
 @pytest.mark.parametrize("name", PORTS)
 def test_mujoco_s_ports_refuse_drivers(name: str) -> None:
-    """The ports lack MuJoCo's callback, by which its adapter drives; the four-bar without a driver is
-    accepted."""
+    """The ports lack the callback by which the adapter drives; a four-bar without driver is accepted."""
     refusal = engine(name).cannot(SCENES["four_bar"]())
     assert refusal is not None and refusal.owner is Owner.ENGINE and "callback" in refusal.reason, refusal
     assert engine(name).cannot(SCENES["four_bar_gravity"]()) is None

@@ -1,5 +1,4 @@
-"""Ensembles: streamed, resumed and spread runs equal single runs; variants differ in the requested
-numbers."""
+"""Streamed, resumed and spread runs of ensembles equal single runs; variants differ as requested."""
 
 import ctypes
 import json
@@ -139,8 +138,7 @@ def test_command_refuses_a_number_that_cannot_vary(text: str, says: str, capsys:
 
 
 def test_command_prints_mean_and_deviation_of_single_runs(tmp_path: Path, capsys: pytest.CaptureFixture):
-    """NumPy's mean and standard deviation of four runs in Python, to rounding; --out has a line for each
-    run."""
+    """NumPy's mean and standard deviation of four runs, to rounding; --out has a line a run."""
     path = tmp_path / "runs.jsonl"
     words = "ensemble spatial_slider_crank_driven --vary joint[B].anchor[0]=0.1+-1e-3 --count 4 --times 0.01"
     command = [*words.split(), "--rtol", "1e-8", "--workers", "1", "--out", str(path)]

@@ -99,8 +99,7 @@ def test_variants_of_a_place_or_ratio_together_equal_single_runs(scene, path):
 
 
 def test_variants_with_and_without_crossings_together_equal_single_runs():
-    """Gravity of up to 400 m/s² along the guide stops some cranks before crank and rod are in line, and
-    others pass this position."""
+    """Up to 400 m/s² along the guide stop some cranks before crank and rod are in line."""
     scenes = list(variants(SCENES["planar_slider_crank_equal"](), [Variation("gravity[0]", -400, 400)], 10))
     runs, differing = compared(scenes, np.linspace(0.0, 0.1, 5), method="taylor")
     assert not differing
@@ -123,8 +122,7 @@ def test_variants_that_all_cross_singular_positions_are_computed_in_one_batch():
 
 
 def test_variants_that_fail_or_complete_together_equal_single_runs():
-    """The largest number of steps allowed is the median of the steps of single runs, so that some variants
-    fail."""
+    """The most steps allowed are the median of single runs' steps, so that some variants fail."""
     scenes = list(variants(CRANK, [MASS, LENGTH], 12))
     steps = [simulate(scene, METHOD, TIMES, LIMITS).cost.steps for scene in scenes]
     runs, differing = compared(scenes, limits=Limits(rtol=1e-6, most_steps=int(np.median(steps))))

@@ -113,8 +113,7 @@ def test_pinocchio_builds_the_machine_of_the_urdf(name):
 
 
 def test_loop_is_closed_between_joints_as_between_their_child_links():
-    """YAML files of parallel robots name the joints at both ends of a loop. Both ways close it with a ball
-    joint at one place."""
+    """YAML files of parallel robots name joints. Both ways close the loop by a ball joint at one place."""
     joints = {joint.find("child").get("link"): joint.get("name") for joint in joints_of("close.urdf")}
     pair = ImportOptions(close=[f"{joints['fb']}={joints['fc']}"])
     by_joints = source(KINDS / "close.urdf", pair).imported.scene

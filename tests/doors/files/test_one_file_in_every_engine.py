@@ -196,8 +196,7 @@ def test_mujoco_accelerates_as_the_file_and_dampers_it_does_not_read_are_named(t
 
 @pytest.mark.parametrize("kind", ["connect", "joint"])
 def test_constraint_rows_of_mujoco_are_the_files_at_four_closed_poses(kind, tmp_path):
-    """The file has a loop or a coupling of joints. The four poses obey it to 1e-11, and rows may differ by
-    1e-9."""
+    """The file has a loop or a coupling. Poses obey it to 1e-11, and rows may differ by 1e-9."""
     file = file_of(path := written(tmp_path, DAMPED[kind]))
     rows = [Mujoco().load(path, MJCF).rows(pose) for pose in file.asked.closed]
     match = matched(file.machine, file.machine, DOUBLE)

@@ -34,8 +34,7 @@ def test_a_packed_folder_renders_as_the_folder_itself_and_has_equal_records(tmp_
 
 @pytest.mark.parametrize("words", [["--section", "paper"], []], ids=["paper", "all sections"])
 def test_a_report_folder_without_the_records_of_the_section_is_named(words, capsys):
-    """The committed folder has records of the stability ladders alone, neither of the paper nor of a
-    report."""
+    """The committed folder has records of the stability ladders alone, not of the paper or a report."""
     assert report(["--render", str(REPORTS / "stability"), *words]) == 2
     assert str(REPORTS / "stability") in capsys.readouterr().err
 

@@ -1,5 +1,4 @@
-"""Record files: appended records are stored whole, other lines are left unchanged, a full disk loses
-nothing."""
+"""Record files: appended records are whole, other lines stay, a full disk loses nothing."""
 
 import json
 import math
@@ -80,8 +79,7 @@ def test_file_without_records_is_refused_and_not_touched(text: str, tmp_path: Pa
 def test_command_refuses_a_file_for_results_that_holds_none_or_cannot_be_written(
     out: str, says: str, tmp_path: Path, capsys, monkeypatch
 ):
-    """`mbref ensemble --out` names a letter, a file in a folder that does not exist, or a folder; the letter
-    stays."""
+    """`mbref ensemble --out` names a letter, which stays, a file in a missing folder, or a folder."""
     monkeypatch.chdir(tmp_path)
     Path("letter.txt").write_text("my only copy")
     few = "--vary gravity[1]=0:1 --count 2 --workers 1 --samples 2 --duration 1e-3"

@@ -189,8 +189,7 @@ def with_hinges(*axes, height: float = 0.0) -> Scene:
     ],
 )
 def test_only_a_single_hinge_axis_in_the_plane_of_a_planar_mechanism_is_a_probable_slip(scene, slips):
-    """Hinges A and B of the slider-crank are normal to the plane. Further hinges T0, T1, … lie in it or not,
-    as the ids say."""
+    """Hinges A and B are normal to the plane. Further hinges T0, T1, … lie in it or not, see the ids."""
     slip = "joint[T0].axis: lies in the plane of the mechanism; other axes are across it"
     assert probable_slips(scene) == [slip] * slips
 
@@ -220,8 +219,7 @@ def test_orientation_in_degrees_is_refused_with_the_formula_of_the_quaternion():
 
 @pytest.mark.parametrize("text", ["wide", "3 parsec", "30 deg", "1e999 mm", "1 2 mm"])
 def test_text_that_is_no_length_is_refused_in_a_sentence(text, snapshot):
-    """Snapshots: no number, an unknown unit, a unit of angle, a number beyond the largest, and two
-    numbers."""
+    """Snapshots: no number, an unknown unit, a unit of angle, a number too large, and two numbers."""
     with pytest.raises(SceneError) as caught:
         find_scene("four_bar").with_("joint[A].anchor", [text, 0.0, 0.0])
     assert caught.value.faults == snapshot
@@ -408,16 +406,14 @@ def test_command_animate_names_the_option_that_shows_several_branches(tmp_path, 
     ],
 )
 def test_command_animate_states_why_there_are_no_branches(words, says, tmp_path, capsys, monkeypatch):
-    """One branch at each position, no position, fewer positions than asked for, or a method that detects
-    none."""
+    """One branch at each position, no or too few positions, or a method that detects none."""
     monkeypatch.chdir(tmp_path)
     assert main(["animate", *words.split(), "--branches"]) == 2
     assert says in capsys.readouterr().err and not list(tmp_path.iterdir())
 
 
 def test_command_list_prints_every_name_within_eighty_columns(capsys):
-    """Names of scenes, and of a formulation, a stabilisation and an integrator; at most 80 characters a
-    line."""
+    """Names of scenes, a formulation, a stabilisation and an integrator; at most 80 characters a line."""
     assert main(["list"]) == 0
     out = capsys.readouterr().out
     assert max(map(len, out.splitlines())) <= 80 and all(name in out for name in SCENES)

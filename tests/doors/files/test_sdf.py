@@ -196,8 +196,7 @@ FAULTS = [  # text of `pair`, the text in its place, the error's words
 
 @pytest.mark.parametrize(("old", "new", "says"), FAULTS, ids=[says for *_, says in FAULTS])
 def test_faulty_sdf_is_refused_with_the_element_s_name(old, new, says, tmp_path):
-    """A file of links a and b on hinges A and B with one faulty text; the error names the element and
-    fault."""
+    """A file of links a, b on hinges A, B with one faulty text; the error names element and fault."""
     assert old in pair()
     with pytest.raises(SceneError, match=says.replace("(", r"\(")):
         read(tmp_path, pair().replace(old, new))

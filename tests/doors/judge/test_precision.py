@@ -34,8 +34,7 @@ def test_array_in_single_precision_is_named(bench, name):
 
 
 def test_reaction_in_single_precision_is_named_with_its_joint(bench):
-    """In the judge's exact run the wrenches of joint J are rounded to single precision; nothing else is
-    named."""
+    """In the exact run wrenches of joint J are rounded to single precision; nothing else is named."""
     wrenches = bench.close.reactions.items()
     single = replace(bench.close, reactions={n: rounded(w) if n == "J" else w for n, w in wrenches})
     assert single_precision(bench.scene, single) == ["reaction in J"]

@@ -63,8 +63,7 @@ AT_THE_END = measures.relative_at_the_end(end, ("x", "y"))
 
 
 def test_truth_that_ends_earlier_judges_only_its_own_samples():
-    """The third sample is off by 9 m, and the truth has two samples. A measure of the end is unknown
-    (None)."""
+    """The third sample is off by 9 m; the truth has two samples. A measure of the end is None."""
     for measure in OF_ALL:
         assert measure(SCENE, moved(2, 1, (9.0, 0.0, 0.0)), at_rest(2)) == 0.0
     assert AT_THE_END(SCENE, at_rest(), at_rest(2)) is None
@@ -93,8 +92,7 @@ def test_relative_measure_is_the_largest_over_all_observed_numbers():
 
 
 def test_end_measure_is_the_largest_relative_error_of_the_last_sample():
-    """x is off by 0.25 of 1 m and y by 2 of 4 m at the end, or x by 1.75 of -1 m; earlier samples, off by 100
-    m, do not count."""
+    """At the end x is off by 0.25 of 1 m, y by 2 of 4 m, or x by 1.75 of -1 m; earlier ones don't count."""
     run = moved(2, 0, (-0.25, 0.0, 0.0))
     run.position[2, 1, 1] += 2.0
     run.position[1] += 100.0

@@ -264,8 +264,7 @@ def test_every_scene_except_the_singular_start_has_a_certified_table():
 
 
 def test_certified_tables_are_unedited_and_bounded_by_1e_20():
-    """The hash in a table equals the digest of its numbers; a table of a later version names the table that
-    it supersedes."""
+    """The hash is the digest of the numbers; a later version names the table that it supersedes."""
     for path in TABLES.values():
         table = json.loads(path.read_text())
         assert table["hash"] == digest(table), f"{path.name} was edited"
@@ -284,8 +283,7 @@ BRIEFLY = [name for name, path in TABLES.items() if json.loads(path.read_text())
     ],
 )
 def test_reference_is_within_its_bound_of_the_certified_table(name):
-    """The table has positions of twenty digits by two other runs, in 30 digits. Errors are over the
-    length."""
+    """The table has positions of twenty digits by two runs in 30 digits. Errors are over the length."""
     scene, table = find_certifiable(name), json.loads(TABLES[name].read_text())
     found, reason = judged(scene, table["times"], *runs(scene, table["times"], SECONDS))
     assert not reason

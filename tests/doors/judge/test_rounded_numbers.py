@@ -1,5 +1,4 @@
-"""Loops whose numbers have 6 or 8 digits, and axes perpendicular to rounding: one reading by judge and
-engines."""
+"""Loops with 6 or 8 digits, and nearly perpendicular axes: judge and engines read them alike."""
 
 from typing import Any
 

@@ -17,8 +17,7 @@ SECONDS = 100.0
 
 @pytest.mark.parametrize("name", ["four_bar", "four_bar_quarter", "four_bar_gravity"])
 def test_tree_formulation_crosses_singular_positions_on_the_smooth_branch(name):
-    """The truth is the closed form, to 1e-11 m, as singular positions magnify rounding; at least three steps
-    cross one."""
+    """The closed form is met to 1e-11 m, as they magnify rounding; at least three steps cross one."""
     scene = SCENES[name]()
     times = np.linspace(0.0, scene.duration, 6)
     motion, exact = tree_motion(scene, times, EXTENDED, seconds=SECONDS), closed_form(scene).poses(times)

@@ -60,8 +60,7 @@ def apart(scene, other):
     "name", ["planar_slider_crank_gravity", "spatial_slider_crank_gravity", "four_bar_gravity"]
 )
 def test_truth_does_not_depend_on_the_sign_of_an_axis(name):
-    """Axes of all hinges and slides of the undriven scene are reversed; poses stay equal to 1e-13 m or
-    rad."""
+    """Axes of hinges and slides of the undriven scene are reversed; poses are equal to 1e-13 m or rad."""
 
     def flipped(joint):
         axis = getattr(joint, "axis", None)

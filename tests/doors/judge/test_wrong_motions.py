@@ -110,8 +110,7 @@ def test_a_shift_is_measured_in_lengths_of_the_mechanism(make, sample):
 @of_each_maker
 @pytest.mark.parametrize("angle", [1e-6, 0.02, 3.0])
 def test_a_rotation_is_measured_by_its_angle(make, angle):
-    """The first body is turned (rad) at one sample. All quaternions change their sign, which is no
-    rotation."""
+    """The first body is turned (rad) at one sample. All quaternions change sign, which is no rotation."""
     _, _, exact = exact_of(make)
     orientation = exact.orientation.copy()
     orientation[4, 0] = rotations.multiply(rotations.from_vector(angle * AXIS), orientation[4, 0])
@@ -153,8 +152,7 @@ def largest_energy(scene: Scene, run: Trajectory) -> float:
 
 @pytest.mark.parametrize("share", [1e-6, 0.03])
 def test_velocities_too_fast_by_a_share_have_that_error_and_kinetic_energies_that_drift(share):
-    """Joints allow velocities (1 + s) v. The kinetic energy T is too large by ((1 + s)² - 1) T, relative to
-    the largest energy."""
+    """Joints allow (1 + s) v. T is too large by ((1 + s)² - 1) T, relative to the largest energy."""
     scene, _, exact = exact_of(double_hinge)
     faster = {name: (1 + share) * getattr(exact, name) for name in ("velocity", "angular_velocity")}
     found = measured(double_hinge, **faster)
@@ -167,8 +165,7 @@ def test_velocities_too_fast_by_a_share_have_that_error_and_kinetic_energies_tha
 
 
 def test_violation_of_a_joint_is_the_gap_that_is_put_in_at_every_level():
-    """Three rows of a hinge are the components of its gap, its rate or its acceleration: the largest is at
-    least 1/√3 of the size."""
+    """Three rows of a hinge are components of its gap or a rate of it: one is at least 1/√3 of it."""
     _, _, exact = exact_of(double_hinge)
     for level, factor in (("position", 1), ("velocity", 10), ("acceleration", 100)):
         moved = changed(getattr(exact, level), 3, 1, factor * SHIFT)

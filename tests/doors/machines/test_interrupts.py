@@ -1,5 +1,4 @@
-"""Interrupts of a compilation inside ``with interrupts_kept()``; each test sends the signal to its own
-process."""
+"""Interrupts of a compilation inside ``with interrupts_kept()``, sent to the test's own process."""
 
 import contextlib
 import signal
@@ -20,8 +19,7 @@ def _python_handler() -> Iterator[None]:
 
 
 def test_interrupt_lost_during_a_compilation_is_raised_at_its_end():
-    """A function that LLVM calls loses the exception, as ``except`` does here. Python's handler is back
-    afterwards."""
+    """A function that LLVM calls loses the exception, as ``except`` does here. The handler is back."""
     done = []
     with pytest.raises(KeyboardInterrupt), interrupts_kept():
         try:
@@ -33,8 +31,7 @@ def test_interrupt_lost_during_a_compilation_is_raised_at_its_end():
 
 
 def test_interrupt_that_is_not_lost_ends_the_compilation_at_once():
-    """Nothing between the signal and Python's handler suppresses the exception; the line after it does not
-    run."""
+    """Nothing before Python's handler suppresses the exception; the line after it does not run."""
     done = []
     with pytest.raises(KeyboardInterrupt), interrupts_kept():
         signal.raise_signal(signal.SIGINT)

@@ -14,8 +14,7 @@ for method in ("lm1+projection/rk4", "taylor"):
 
 
 def test_modules_of_taylor_are_loaded_only_by_runs_that_use_them():
-    """A new process runs another method first and taylor then, and prints after each whether it has modules
-    of mbref.taylor."""
+    """A process runs another method, then taylor, and prints whether it has modules of mbref.taylor."""
     plain = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     ended = subprocess.run(
         [sys.executable, "-c", RUN], env=plain, stdout=subprocess.PIPE, text=True, check=True

@@ -16,8 +16,7 @@ PAIRS = (1, LARGE // 3 + 1)  # three rows a pair: one pair is solved by dense, m
 
 
 def pairs(count, gap=0.0, **of_first):
-    """Return pairs of a mass of 1 kg at a ball joint with a rod of 3 kg, whose centre is ARM above the
-    joint."""
+    """Return pairs of a mass of 1 kg at a ball joint with a rod of 3 kg, its centre ARM above."""
     bodies, joints = [], []
     for k in range(count):
         x = 2.0 * k
@@ -60,8 +59,7 @@ def test_missing_velocities_minimise_the_kinetic_energy(count):
 
 
 def test_report_of_a_start_names_corrections_of_more_than_a_billionth():
-    """``off`` has the relative violations of the given positions and velocities of a start. Up to 1e-9 the
-    report is empty."""
+    """``off`` has relative violations of given positions and velocities; up to 1e-9 none is reported."""
     state = dict.fromkeys(("q", "v", "given"), np.zeros(0))
     for off, says in (
         ((1e-10, 1e-10), "^$"),

@@ -1,5 +1,4 @@
-"""Spatial linkages with rows that are redundant only where the constraints hold, not at each stage of a
-step."""
+"""Spatial linkages with rows that are redundant only where constraints hold, not at each stage."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,4 @@
-"""Motions that drivers prescribe, by Taylor series: against closed forms, over many singular positions and
-beside some."""
+"""Driven motions by Taylor series: closed forms, over many singular positions and beside some."""
 
 import math
 

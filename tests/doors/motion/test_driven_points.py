@@ -78,8 +78,7 @@ def test_driver_of_a_point_that_contradicts_another_driver_is_named(capsys, tmp_
 
 
 def test_driver_of_a_point_is_a_driver_of_a_free_joint(tmp_path, capsys):
-    """A written scene has the joint, equals the scene with the point, and its numbers have paths. MJCF has a
-    hinge only."""
+    """A written scene has the joint and equals the scene with the point. MJCF has a hinge only."""
     scene = hanging(tip(polynomial=[0.0, "20 mm/s"]))
     free = Free(name="tip", bodies=("ground", "rod"), anchor=(0.6, -0.8, 0.0), axis=(1.0, 0.0, 0.0))
     assert scene.joint[-1] == free and scene.driver == (Driver(joint="tip", polynomial=(0.0, 0.02)),)

@@ -233,8 +233,7 @@ def test_judge_finds_the_events_by_itself(scene, formulation):
     ],
 )
 def test_fault_of_a_stop_is_named(stop, says):
-    """A stop must have the start, 0 m, in its range, an end, and a restitution of at most 1. The ends of a
-    slide are lengths."""
+    """A stop has the start, 0 m, in its range, an end and at most the restitution 1; ends are lengths."""
     with pytest.raises(SceneError, match=says):
         ball(0.5, 1.0).with_(joint=[slide("S", "ground", "ball", ORIGIN, Z, stop=stop)])
 

@@ -42,8 +42,7 @@ def difference(scene, method=ORDER_16, rtol=1e-11):
 
 @pytest.mark.parametrize("seed", (3, 11, 17, 21))
 def test_generated_code_moves_random_mechanisms_without_springs_as_the_general_kernels(seed):
-    """``difference`` is of positions by both codes, over the length; their sums have other orders, so that
-    rounding is left."""
+    """``difference`` is of positions by both codes, over the length; rounding is left."""
     scene = random_mechanism(seed)
     loads = tuple(load for load in scene.load if not hasattr(load, "stiffness"))
     assert difference(scene.with_(load=loads)) <= ROUNDING

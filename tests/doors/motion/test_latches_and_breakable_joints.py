@@ -141,8 +141,7 @@ def test_pendulum_released_by_its_tension_falls_freely(tension):
     ids=["size", "x", "-x", "moment"],
 )
 def test_bracket_breaks_where_its_reaction_reaches_the_limit(pull, release):
-    """The reaction is minus the pull. Its size, its x, or minus its x is 5 t (N or N m), which is at the
-    limit at 1 s."""
+    """The reaction is minus the pull: its size, x or minus x is 5 t (N or N m), at the limit at 1 s."""
     load = {**pull, "body": "a", "factor": {"polynomial": [0.0, 1.0]}}
     bracket = joint("B", "fixed", "ground", "a", release=release)
     mass = body("a", 1.0, [0.1] * 3, ORIGIN)

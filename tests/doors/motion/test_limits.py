@@ -29,8 +29,7 @@ def test_limit_that_is_no_finite_number_in_its_interval_is_refused_by_name(name,
 
 @pytest.mark.parametrize("name", STEPS)
 def test_step_limit_of_zero_which_means_no_limit_is_accepted(name):
-    """STEPS are the limits of the length and turn of a step. A whole number, 0, is stored as the float
-    0.0."""
+    """STEPS limit the length and turn of a step. A whole number, 0, is stored as the float 0.0."""
     assert repr(getattr(Limits(**{name: 0}), name)) == "0.0"
 
 

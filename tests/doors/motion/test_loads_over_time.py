@@ -67,8 +67,7 @@ FAULTS = {
 
 @pytest.mark.parametrize("message", FAULTS)
 def test_faulty_function_of_time_is_refused_by_path_and_line(message, tmp_path):
-    """FAULTS has a factor of a force, in a scene of 2 s, by a part of its refusal; the line is the factor's
-    in the file."""
+    """FAULTS has factors of a force in a scene of 2 s, by a part of the refusal, which has their line."""
     text = scenes.pushed(Factor()).to_dict()
     text["load"][0]["factor"] = FAULTS[message]
     path = tmp_path / "slide.toml"

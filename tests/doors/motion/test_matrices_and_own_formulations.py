@@ -147,8 +147,7 @@ def test_own_formulation_follows_loads_that_are_switched():
 
 
 def test_own_stabilisation_replaces_the_state_after_each_step():
-    """The function returns q and zero velocities after each step: bodies are at rest at every later
-    sample."""
+    """The function returns q and zero velocities: bodies are at rest at every later sample."""
     seen = []
 
     def stopped(T):

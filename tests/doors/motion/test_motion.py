@@ -37,8 +37,7 @@ def test_angle_of_a_joint_does_not_depend_on_the_sign_of_quaternions(driven):
 
 
 def test_displacement_of_a_guide_is_how_far_its_slider_moved(crank):
-    """The guide D is along x, so that x of the slider changes by the displacement, to rounding; it has no
-    angle."""
+    """The guide D is along x: the slider's x changes by the displacement; it has no angle."""
     joint, slider = crank.joint("D"), crank["slider"]
     assert np.allclose(joint.displacement, slider.position[:, 0] - slider.position[0, 0], atol=ROUNDING)
     assert joint.angle is None and joint.displacement[-1] != 0
@@ -117,8 +116,7 @@ def test_data_frame_without_pandas_names_the_package_to_install(crank, monkeypat
 
 
 def test_plot_has_a_panel_for_each_quantity(crank):
-    """A column, the three columns of a vector, and an angle: positions in one panel with a legend, angles in
-    another."""
+    """A column, a vector's three and an angle: positions in one panel with legend, angles in another."""
     axes = crank.plot("slider.position.x", "rod.position", "A.angle").axes
     assert [a.get_ylabel() for a in axes] == ["position, m", "angle, rad"]
     names = [text.get_text() for text in axes[0].get_legend().get_texts()]
@@ -134,8 +132,7 @@ def test_plot_without_columns_shows_joint_coordinates_and_energy(crank):
 
 
 def test_repr_of_a_motion_is_one_line_and_its_html_an_animation(crank):
-    """Bodies and joints of a motion are shown in fewer than 80 characters. HTML shows quotation marks as
-    entities."""
+    """Bodies and joints are shown in fewer than 80 characters. HTML has quotation marks as entities."""
     assert repr(crank) == (
         "<Motion of 'planar_slider_crank' by mbref taylor: COMPLETED, 21 samples to t = 0.1 s>"
     )

@@ -61,8 +61,7 @@ def test_method_that_cannot_choose_the_branch_does_not_complete_on_a_wrong_one()
 
 
 def test_run_with_steps_too_short_for_its_end_is_given_up():
-    """10¹² steps would be needed, and 5 million are allowed: the run ends as soon as that is seen, after
-    fewer than 30 000 steps."""
+    """10¹² steps are needed, 5 million allowed: the run ends after fewer than 30 000."""
     run = simulate("planar_slider_crank", times=[1.0], limits=Limits(largest_step=1e-12))
     assert run.outcome.label == "STEP_FAILED" and run.cost.steps < 30_000
     assert "too short to reach the end" in run.message

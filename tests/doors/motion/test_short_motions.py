@@ -77,7 +77,6 @@ def test_reactions_and_gravity_obey_newtons_and_eulers_equations_of_every_body(n
 
 
 def test_all_short_motions_together_take_at_most_1050_steps():
-    """At a tolerance of 1e-12 all motions took 970 steps when this limit was chosen; shorter steps need
-    more."""
+    """At a tolerance of 1e-12 all motions took 970 steps at first; shorter steps need more."""
     runs = [run_of(name) for name in MOTIONS]
     assert {run.outcome.name for run in runs} == {"COMPLETED"} and sum(run.cost.steps for run in runs) < STEPS

@@ -1,5 +1,4 @@
-"""Runs of methods that watch the rank end at a singular position; methods that claim to cross it are right
-after it."""
+"""Methods that watch the rank end at singular positions; those that claim to cross are right."""
 
 from itertools import product
 
@@ -103,8 +102,7 @@ def test_regularised_method_meets_the_closed_form_after_the_singular_position_or
 
 @pytest.mark.parametrize("method", ["alf-dual+none", "alf+baumgarte"])
 def test_regularised_method_crosses_the_flat_position_of_a_rhombus_as_its_closed_form(method):
-    """In the closed form the coupler does not turn, and the cranks have one angle, by the energy. The error
-    is below 1000 rtol."""
+    """The coupler does not turn, the cranks have one angle, by the energy; errors are below 1000 rtol."""
     scene, end, rtol = four_bar_gravity(), 0.5, 1e-7
     run = simulate(scene, method, np.linspace(0.0, end, 5), Limits(rtol=rtol))
     assert first_crossing(scene, end) < end
@@ -125,8 +123,7 @@ def test_run_ends_where_all_loops_of_a_chain_are_flat(loops, rtol):
 @pytest.mark.parametrize("rtol", [1e-5, 1e-8])
 @pytest.mark.parametrize("loops", [2, 6, 10])
 def test_chain_of_slider_cranks_completes_though_single_pivots_vanish(loops, rtol):
-    """Single pivots vanish twice a turn of a crank, but the rank stays. Errors against the judge's closed
-    form are below 100 rtol."""
+    """Single pivots vanish twice a turn, but the rank stays. Errors are below 100 rtol."""
     scene, times = find_scene(f"slider_crank_chain[{loops}]"), np.linspace(0.0, 0.4, 5)
     run = simulate(scene, "alf-dual+projection", times, Limits(rtol=rtol))
     assert relative_error(run, scene) < 100 * rtol
@@ -158,8 +155,7 @@ def test_run_from_a_singular_position_ends_at_its_start_if_the_method_does_not_c
 
 
 def test_bar_pulls_a_swinging_point_by_three_times_its_weight_component():
-    """1 kg on a bar of 1 m, released level: at φ below the horizontal the bar pulls with 3 m g sin φ, here to
-    ten times rtol (N)."""
+    """1 kg on a bar of 1 m, released level: at φ below it the bar pulls 3 m g sin φ, to ten rtol (N)."""
     rtol = 1e-9
     run = simulate("point_pendulum", times=np.linspace(0.0, 2.0, 21), rtol=rtol)
     along = -np.einsum("ki,ki->k", run.reactions["pivot"][:, :3], run.position[:, 0])

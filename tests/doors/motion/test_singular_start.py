@@ -129,8 +129,7 @@ def test_branches_of_a_start_at_rest_are_listed_without_velocities():
 
 
 def test_run_of_a_microsecond_from_a_singular_position_is_exact():
-    """Crank and rod of equal length start upright. Runs of 1 and 100 µs have the judge's closed form, to
-    rounding."""
+    """Equal crank and rod start upright. Runs of 1 and 100 µs have the closed form, to rounding."""
     scene = upright_slider_crank(-30.0)
     for end in (1e-6, 1e-4):
         times = np.linspace(0.0, end, 3)
@@ -198,8 +197,7 @@ def test_spherical_loop_leaves_the_flat_position_on_the_branch_of_its_velocities
 
 
 def test_start_near_the_flat_position_of_a_spherical_loop_does_not_shorten_later_steps():
-    """Fewer than 100 steps at rtol 1e-6. Rows that count as nearly dependent beyond the start would take 200
-    000 steps."""
+    """Fewer than 100 steps at rtol 1e-6; rows that count as nearly dependent would take 200 000."""
     scene = spherical_loop(0.3, 0.6, 1e-4, (2.0, 2.0 * ratio(0.3, 0.6)))
     centred = scene.with_("joint[B].anchor", (0.0, 0.0, 0.0)).with_("joint[D].anchor", (0.0, 0.0, 0.0))
     run = simulate(centred, "taylor", [1.0], Limits(rtol=1e-6))

@@ -1,5 +1,4 @@
-"""The method taylor against closed forms: springs, drivers, full turns, phases, and errors over
-tolerances."""
+"""The method taylor against closed forms: springs, drivers, full turns, phases, tolerances."""
 
 import numpy as np
 import pytest
@@ -32,8 +31,7 @@ def test_motion_by_series_is_the_closed_form(form):
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8])
 @pytest.mark.parametrize("form", [pendulum, torsion], ids=lambda form: form.__name__)
 def test_error_by_series_is_a_fiftieth_to_a_ten_thousandth_of_the_tolerance(form, rtol):
-    """The error (rad) is below rtol / 50. It is above rtol / 10 000: steps much shorter than rtol asks for
-    would leave less."""
+    """The error (rad) is below rtol / 50, and above rtol / 10 000: steps are not much too short."""
     scene, exact = form()
     times = np.linspace(0.0, scene.duration, 3)
     turned = simulate(scene, "taylor", times, Limits(rtol=rtol)).orientation
@@ -57,8 +55,7 @@ def test_quaternion_of_a_spinning_body_is_continuous_over_full_turns(axis):
 
 @pytest.mark.slow
 def test_phase_of_a_fast_top_is_exact_after_3000_radians():
-    """The truth is the judge's reference, met to 100 rtol (rad). Rounding of the fast spin must not be
-    magnified."""
+    """The judge's reference is met to 100 rtol (rad). Rounding of the fast spin is not magnified."""
     scene = SCENES["heavy_top"]().with_(duration=4.0)
     times = np.linspace(0.0, scene.duration, 5)
     rtol = 1e-11

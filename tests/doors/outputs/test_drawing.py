@@ -127,8 +127,7 @@ def test_names_of_joints_near_each_other_do_not_overlap(gap, names):
 
 
 def test_joints_at_one_place_share_one_label():
-    """C, the pin of a slider, and D, its guide, are at one place; the other joints of the slider-crank have
-    labels of their own."""
+    """The slider's pin C and guide D are at one place; the other joints have labels of their own."""
     scene = SCENES["planar_slider_crank"]()
     assert {"A", "B", "C, D"} <= set(texts(still(scene)))
 
@@ -232,8 +231,7 @@ def test_planar_mechanism_is_viewed_along_its_normal_and_a_spatial_one_obliquely
 
 
 def test_page_shows_all_points_within_its_margins():
-    """Random points in space, a page of at most 600 by 400 px with margins of 40 px, which hold to
-    rounding."""
+    """Random points in space, a page of at most 600 by 400 px with margins of 40 px, to rounding."""
     points = np.random.default_rng(1).normal(size=(30, 3)) * np.array([5.0, 1.0, 0.1])
     page = Page.around(points, View.parse("oblique"), 600.0, 40.0, 400.0)
     margin, seen = 40 - 1e-9, page.pixels(points)  # px

@@ -72,8 +72,7 @@ def true_error(scene: Scene, motion: mbref.Motion, truth: Truth) -> np.ndarray:
 
 
 def errors_over_estimates(name: str, rate: float, method: str | None, rtol: float) -> np.ndarray:
-    """Return the ratios at TIMES of a completed motion; ``rate`` is the maker's speed (rad/s, m/s) or
-    distance (m)."""
+    """Return the ratios at TIMES of a motion; ``rate`` is a speed (rad/s, m/s) or distance (m)."""
     make, truth = MAKERS[name]
     scene = make(rate)
     motion = mbref.simulate(scene, method, TIMES, rtol=rtol)

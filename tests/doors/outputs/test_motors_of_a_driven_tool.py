@@ -56,8 +56,7 @@ class Half:
         return turn, moved, cross(self.w, moved) / OUTER**2
 
     def virtual_work(self, v: np.ndarray, a: np.ndarray, e: np.ndarray) -> float:
-        """Return Σ m (r'' - g)·δr + J φ'' δφ of both rods for the tool's velocity, acceleration and virtual
-        displacement e."""
+        """Return Σ m (r'' - g)·δr + J φ'' δφ of both rods for the tool's motion and displacement e."""
         turn, moved, _ = self.rates(v)
         along = moved @ moved + self.w @ a + INNER * turn**2 * (self.w @ self.u)
         second = along / (INNER * (self.w @ self.n))

@@ -125,8 +125,7 @@ def test_component_is_determined_where_the_judge_finds_no_open_wrench(name):
 
 
 def test_unavailable_column_is_refused_with_its_need_or_a_suggestion(sprung):
-    """The pendulum has no mass (``bare``), or its hinge A has no displacement; other names are misspelt or
-    unknown."""
+    """``bare`` has no mass, hinge A has no displacement; other names are misspelt or unknown."""
     massless = sprung.mechanism.body[0].model_copy(update={"mass": None, "inertia": None})
     bare = simulate(sprung.mechanism.with_(body=[massless], load=[]), times=TIMES[:2])
     for motion, name, says in (

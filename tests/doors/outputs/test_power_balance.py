@@ -24,8 +24,7 @@ def run(scene: Scene, method: str = "taylor", rtol: float = 1e-13) -> Motion:
 
 
 def off(motion: Motion) -> float:
-    """Return the imbalance, relative to the largest power of a driver, a load or a weight; NaN without
-    samples."""
+    """Return the imbalance over the largest power of a driver, load or weight; NaN without samples."""
     scene = motion.mechanism
     if not motion.times.size:
         return float("nan")
@@ -49,8 +48,7 @@ def test_work_of_drivers_and_loads_is_the_change_of_energy(seed, method, rtol):
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(100, 340, MANY))
 def test_work_is_the_change_of_energy_of_many_mechanisms(first):
-    """Of 20 mechanisms at most 3 may have no balance: a run that has no sample, or powers too fast for the
-    panels."""
+    """At most 3 of 20 mechanisms may have none: no sample, or powers too fast for the panels."""
     found = {seed: off(run(powered_mechanism(seed))) for seed in range(first, first + MANY)}
     moved = {seed: imbalance for seed, imbalance in found.items() if not np.isnan(imbalance)}
     assert len(moved) >= MANY - WITHOUT_BALANCE, f"balances from {first} on for {list(moved)} only"

@@ -37,8 +37,7 @@ def test_springs_store_half_their_stiffness_times_the_square_of_their_stretch():
 
 
 def test_spring_of_a_slide_stores_half_its_stiffness_times_the_square_of_its_stretch():
-    """A driver moves the block by x = 2 t + 1.5 t² m: 8 N/m (x + 0.5 m)² / 2, as the spring is relaxed at
-    -0.5 m."""
+    """A driver moves the block by x = 2 t + 1.5 t² m; relaxed at -0.5 m: 8 N/m (x + 0.5 m)² / 2."""
     block = {"name": "block", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.8, 0.0, 0.0]}
     spring = {"type": "slide_spring", "joint": "S", "stiffness": 8.0, "damping": 0.3}
     joint, load = slide("S", "ground", "block", (0.0, 0.0, 0.0)), {**spring, "natural_displacement": -0.5}

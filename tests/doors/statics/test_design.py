@@ -76,8 +76,7 @@ def test_assembly_of_a_closed_loop_without_requested_lengths_leaves_it_in_place_
     ],
 )
 def test_impossible_length_or_pair_of_joints_is_refused(pair, size, says):
-    """Links of 0.5 m close no loop with one of 5 m; there is no joint X, and A and C are ends of a
-    diagonal."""
+    """Links of 0.5 m close no loop with one of 5 m; there is no joint X; A-C is a diagonal."""
     with pytest.raises(SceneError, match=says):
         assemble(find_scene("four_bar_gravity"), {pair: size})
 
@@ -175,8 +174,7 @@ def test_diagnosis_along_a_motion_that_ends_early_states_cause_and_time():
 
 
 def test_driver_of_a_locked_loop_is_refused_at_the_start():
-    """A hinge tilted by 0.1 rad leaves the loop no degree of freedom, so that the driver's rate at t = 0
-    contradicts the joints."""
+    """A hinge tilted by 0.1 rad locks the loop: the driver's rate at t = 0 contradicts the joints."""
     with pytest.raises(
         SceneError, match=r"driver\[A\]: contradicts the joints at t = 0, most of all at joint"
     ):

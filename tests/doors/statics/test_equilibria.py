@@ -112,8 +112,7 @@ def test_two_rods_that_a_spring_of_any_stiffness_straightens_are_found_hanging(s
 
 
 def centres(lengths: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Return the centres (k, 3) of rods that hang from the origin, each on the former, at angles from the
-    vertical."""
+    """Return centres (k, 3) of rods that hang on each other from the origin, at these angles."""
     ways = (lengths * np.array([np.sin(angles), -np.cos(angles), 0 * angles])).T
     return np.cumsum(ways, axis=0) - ways / 2
 

@@ -18,8 +18,7 @@ def damped_spring() -> Scene:
 
 
 def test_a_damped_torsion_spring_has_the_roots_of_its_equation():
-    """(J + m l²) s² + c s + k = 0 about the natural angle; c is 3 N m s/rad and k is 40 N m/rad. The damping
-    ratio is -Re s / |s|."""
+    """(J + m l²) s² + c s + k = 0 with c = 3 N m s/rad, k = 40 N m/rad; the damping ratio is -Re s / |s|."""
     rounding, [each] = 1e-10, equilibria(damped_spring(), starts=1)  # relative
     roots = np.roots([INERTIA + MASS * ARM**2, 3.0, 40.0])
     assert np.allclose(sorted(each.eigenvalues, key=np.imag), sorted(roots, key=np.imag), rtol=rounding)
@@ -60,8 +59,7 @@ def test_scene_of_an_equilibrium_counts_angles_from_its_pose_and_is_its_own_equi
     ],
 )
 def test_scene_without_equilibria_is_refused_with_the_driver_or_mass_that_is_the_cause(change, says):
-    """A driver may accelerate, oscillate, turn about an axis across gravity, or hold the only freedom; a body
-    may have no mass."""
+    """A driver accelerates, oscillates, turns across gravity or holds the only freedom; no mass."""
     with pytest.raises(SceneError, match=says):
         equilibria(pendulum().with_(**change))
 

@@ -117,15 +117,13 @@ BODIES = [*turning_pendulum(1.0).body, rod("free", (0.0, 0.0, 5.0), 1.0, 0.1)]
     [({"load": [PUSH]}, "loads"), ({"joint": JOINTS, "body": BODIES}, "joint 'C' does not turn with it")],
 )
 def test_motions_that_are_not_steady_are_refused_with_the_cause(change, says):
-    """PUSH, a force on the ball, has a direction fixed in space; in JOINTS a rod ties the ball to a point of
-    the ground."""
+    """PUSH on the ball has a direction fixed in space; in JOINTS a rod ties the ball to the ground."""
     with pytest.raises(SceneError, match=rf"driver\[A\]: .*{says}.*, so the motion is not steady"):
         equilibria(turning_pendulum(6.0, **change), starts=2)
 
 
 def test_commands_print_stability_and_rate_of_a_steady_motion(tmp_path, capsys):
-    """A pendulum on a spindle that turns at 6 rad/s, above its critical rate, has stable motions beside the
-    axis."""
+    """A pendulum on a spindle above its critical rate, 6 rad/s, has stable motions beside the axis."""
     path = str(tmp_path / "my.toml")
     turning_pendulum(6.0).save(path)
     assert main(["equilibrium", path, "--starts", "8"]) == 0
