@@ -6,10 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import mbref
 from crosscheck.engines.mujoco.importing.reading import Source, source
 from crosscheck.judge.gauss_principle import rank
-from mbref import rotations
 from mbref.formats import ImportOptions
 from mbref.scene import SceneError
 from tests.helpers import originals
@@ -57,14 +55,6 @@ def test_an_open_connect_of_sites_is_closed_with_the_lengths_of_the_file(tmp_pat
     assert difference(found) < SAME
 
 
-def test_loop_closes_at_the_given_pose_of_a_joint(tmp_path):
-    """The option ``pose`` gives joint A 0.4 rad, and the other joints close the loop. The scene moves as
-    MuJoCo's model of the file at this pose."""
-    found = read(tmp_path, OPEN_LOOP.replace("EQUALITY", CONNECT), pose={"A": 0.4})
-    assert found.qpos[0] == 0.4
-    assert difference(found) < SAME
-
-
 def test_loop_that_a_keyframe_almost_closes_is_closed_near_it(tmp_path):
     """In a pose with a closed loop A is at 0.4 rad; each angle of the keyframe is 0.01 rad larger. The loop
     is closed by the least motion from the keyframe, within 0.05 rad of this pose. From the file's zero
@@ -97,36 +87,6 @@ def test_refusal_of_a_loop_that_is_too_short_states_the_least_gap(span, tmp_path
     assert least - 0.005 < printed < 1.02 * least
 
 
-def test_a_weld_without_torque_is_a_spherical_joint(tmp_path):
-    """In MuJoCo, a weld with torquescale="0" has forces and no torques. The scene moves as MuJoCo's model."""
-    weld = '<weld name="C" site1="tip" site2="toe" torquescale="0"/>'
-    found = read(tmp_path, OPEN_LOOP.replace("EQUALITY", weld))
-    assert found.imported.scene.joint_named("C").type == "spherical"
-    assert difference(found) < SAME
-
-
-def test_bodies_of_a_weld_are_assembled_at_its_relative_pose(tmp_path):
-    """``relpose`` is the pose of body b's frame in a's: (0.3, 0.1, 0) m, turned by 0.5 rad about y, so that
-    the quaternion is (cos 0.25, 0, sin 0.25, 0). The scene's positions are centres of mass, at (0.1, 0.02, 0)
-    m in both frames. A note says that the weld was open."""
-    two = f"""<mujoco><worldbody><body name="a" pos="0 0 1">{hinge("A")}{hinge("A2", "1 0 0")}{LUMP}</body>
-    <body name="b" pos="0.4 0 1"><freejoint/>{LUMP}</body></worldbody>
-    <equality><weld name="W" body1="a" body2="b"
-    relpose="0.3 0.1 0 0.9689124217106447 0 0.24740395925452294 0"/>
-    </equality></mujoco>"""
-    held = read(tmp_path, two)
-    joint = held.imported.scene.joint_named("W")
-    assert joint.type == "fixed" and any("'W' was open by" in note for note in held.imported.notes)
-    a, b = held.imported.scene.body
-    back = rotations.conjugate(np.array(a.orientation))
-    centre = rotations.rotate(back, np.subtract(b.position, a.position))  # of b from that of a, in a's frame
-    turn = rotations.multiply(back, np.array(b.orientation))
-    turned = [0.1 * np.cos(0.5), 0.02, -0.1 * np.sin(0.5)]  # (0.1, 0.02, 0) by 0.5 rad about y
-    assert centre == pytest.approx(np.array([0.3, 0.1, 0.0]) + turned - [0.1, 0.02, 0.0], abs=1e-9)  # m
-    assert turn * np.sign(turn[0]) == pytest.approx([np.cos(0.25), 0.0, np.sin(0.25), 0.0], abs=1e-9)
-    assert difference(held) < SAME
-
-
 def middle(first: str, second: str, offset: str = "0 0 0", more: str = "") -> str:
     """Return a URDF: hinge about the axis ``first``, link ``mid`` without mass, hinge about ``second`` at an
     offset (m) from the first, link ``l`` of 0.4 kg."""
@@ -154,17 +114,6 @@ def test_two_hinges_of_a_massless_link_leave_two_freedoms(second, offset, joints
     assert [joint.type for joint in scene.joint] == joints and [body.mass for body in scene.body] == masses
     assert 6 * len(scene.body) - rank(scene) == 2
     assert difference(found) < SAME
-
-
-def test_a_massless_link_that_carries_two_bodies_remains_a_body(tmp_path):
-    """Three hinges meet at it, which no joint replaces. The scene moves as MuJoCo's model."""
-    more = """<link name="o"><inertial><mass value="1"/>
-    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>
-    </inertial></link>
-    <joint name="j3" type="continuous"><parent link="mid"/><child link="o"/><axis xyz="1 0 0"/></joint>"""
-    both = read(tmp_path, middle("0 1 0", "0 0 1", more=more), "two.urdf")
-    assert [body.name for body in both.imported.scene.body if not body.mass] == ["mid"]
-    assert difference(both) < SAME
 
 
 def test_a_massless_link_that_carries_nothing_is_left_out_with_a_note(tmp_path):
@@ -212,13 +161,6 @@ def test_note_names_frames_of_two_branches_that_coincide(tmp_path):
     assert any("'end_a' (on 'two') and 'end_b' (on 'three') coincide" in note for note in notes)
 
 
-def test_close_joins_two_frames_by_a_spherical_joint(tmp_path):
-    """The judge's rank of the joints' rows leaves one of the 18 freedoms of three bodies."""
-    found = read(tmp_path, open_chain(), "closed.urdf", close=["end_a=end_b"])
-    assert found.imported.scene.joint[-1].type == "spherical" and not found.imported.notes
-    assert 18 - rank(found.imported.scene) == 1
-
-
 def test_close_reads_pairs_of_frames_from_a_yaml_file(tmp_path):
     """The scene's joints are those with the pair end_a=end_b of the command line."""
     (tmp_path / "loops.yaml").write_text("closed_loop: [[end_a, end_b]]\ntype: [3d]\n")
@@ -261,34 +203,3 @@ def test_a_mimic_joint_is_a_coupling_whose_offset_the_pose_meets(tmp_path):
     assert (coupling.joints, coupling.ratio) == (("j1", "j2"), -1.5)
     first, second = found.qpos
     assert second == pytest.approx(0.3 - 1.5 * first, abs=1e-12)  # rad
-
-
-# two wheels on parallel hinges, coupled by q₂ = POLY(q₁); the first has an armature of 0.02 kg m²
-GEARS = """<mujoco><option gravity="0 0 -9.81"/><worldbody>
-<body name="w1" pos="0 0 1"><joint name="g1" axis="0 1 0" armature="0.02"/>
-<inertial pos="0.05 0 0" mass="1" diaginertia=".01 .01 .01"/></body>
-<body name="w2" pos="0.3 0 1"><joint name="g2" axis="0 1 0"/>
-<inertial pos="0 0.02 0.1" mass="1" diaginertia=".02 .02 .02"/></body>
-</worldbody><equality><joint name="gears" joint1="g2" joint2="g1" polycoef="POLY"/></equality></mujoco>"""
-
-
-def test_a_linear_equality_of_joints_is_a_coupling_that_the_motion_keeps(tmp_path):
-    """The file says q₂ = -2 q₁, and the scene moves as MuJoCo's model of it. In mbref's run of 0.2 s the
-    angles obey the ratio to the run's tolerance, 1e-9, while the first wheel turns by over 0.01 rad."""
-    found = read(tmp_path, GEARS.replace("POLY", "0 -2 0 0 0"))
-    assert difference(found) < SAME
-    (coupling,) = found.imported.scene.coupling
-    assert (coupling.name, coupling.joints, coupling.ratio) == ("gears", ("g1", "g2"), -2.0)
-    fallen = mbref.simulate(found.imported.scene, times=[0.0, 0.2], method="alf-dual+projection/dop853")
-    turned = [fallen.joint(name).angle[-1] for name in ("g1", "g2")]
-    assert turned[1] == pytest.approx(-2 * turned[0], rel=1e-9) and turned[0] > 0.01
-
-
-def test_bodies_begin_with_the_velocities_of_the_keyframe(tmp_path):
-    """The file has no loop here. By its keyframe `left` turns at 1 rad/s about y, `bar` at 2 rad/s relative
-    to `left`, and `right` at 4 rad/s."""
-    text = OPEN_LOOP.replace("EQUALITY", "").replace('0.1"/></key', '0.1" qvel="1 2 4"/></key')
-    bodies = read(tmp_path, text, keyframe="low").imported.scene.body
-    assert [body.angular_velocity for body in bodies] == [
-        pytest.approx((0.0, rate, 0.0)) for rate in (1.0, 3.0, 4.0)
-    ]
