@@ -55,20 +55,6 @@ def printed(capsys: pytest.CaptureFixture[str], folder: Path, name: str, *option
     return capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("command", "says"),
-    [
-        (["run"], "still plain : CRASHED: RuntimeError"),
-        (["tune"], "no run completes"),
-        (["tune", "--closure", "1mm"], "no run completes"),
-    ],
-    ids=["run", "tune", "tune to a closure"],
-)
-def test_command_prints_that_no_run_of_a_crashing_engine_completed(command, says, tmp_path, capsys):
-    """The engine "still" raises a RuntimeError in each run; "plain" is its only setting."""
-    assert says in " ".join(printed(capsys, tmp_path, *command).split())
-
-
 @pytest.mark.parametrize(("command", "outcomes"), [("run", [("CRASHED", [])]), ("tune", [])])
 def test_json_of_run_has_the_crash_of_an_engine_and_json_of_tune_no_setting(
     command, outcomes, tmp_path, capsys

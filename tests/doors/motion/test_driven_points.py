@@ -8,7 +8,6 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 import mbref
-from crosscheck.engine import engine, engine_names
 from mbref.cli.commands import main
 from mbref.scene import Driver, Free, Scene, SceneError
 from tests.helpers.parts import hinge, rod
@@ -110,11 +109,3 @@ def test_faulty_drivers_of_points_are_refused_with_their_field(change, fault):
     with pytest.raises(SceneError) as refusal:
         hanging({**tip(), **change})
     assert any(each.startswith(fault) for each in refusal.value.faults), refusal.value.faults
-
-
-def test_engines_refuse_driven_points_by_the_type_of_joint():
-    """Engines other than mbref name the joint's type."""
-    scene = hanging(tip(polynomial=[0.0, 0.1]))
-    refusals = {name: engine(name).cannot(scene) for name in engine_names() if name != "mbref"}
-    assert all(each is not None and "free" in each.reason for each in refusals.values()), refusals
-    assert engine("mbref").cannot(scene) is None

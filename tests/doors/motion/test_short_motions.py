@@ -8,7 +8,6 @@ import pytest
 import mbref
 from tests.helpers.errors import pose_error, rate_error
 from tests.helpers.exact_motions import stored
-from tests.helpers.newton_euler import unbalanced
 from tests.helpers.short_motions import CROSSED, MOTIONS, times_of
 
 ROUNDING = 2.2e-16
@@ -59,21 +58,6 @@ def test_accelerations_are_the_rates_of_velocities(name):
         curvature = np.abs(acceleration[2] - acceleration[0]).max()
         scale = np.abs(acceleration).max() + np.abs(rate).max() / scene.duration
         assert np.abs(slope - acceleration[1]).max() <= 1e-4 * scale + 0.01 * curvature
-
-
-BARE = [
-    name
-    for name, make in MOTIONS.items()
-    if not ((scene := make()).load or scene.coupling or any(joint.reflected_inertia for joint in scene.joint))
-]
-
-
-@pytest.mark.parametrize("name", BARE)
-def test_reactions_and_gravity_obey_newtons_and_eulers_equations_of_every_body(name):
-    """m a = m g + Σ F and J ω' + ω × J ω = Σ M, for mechanisms without loads, couplings and armatures. The
-    rest is relative to the largest force or moment: a thousand times the tolerance."""
-    force, moment = unbalanced(MOTIONS[name](), run_of(name))
-    assert max(force, moment) < 1e-9
 
 
 def test_all_short_motions_together_take_at_most_1050_steps():
