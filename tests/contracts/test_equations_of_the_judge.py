@@ -129,9 +129,8 @@ def pendulum() -> Scene:
 
 
 def test_terms_of_a_pendulum_are_its_forces_mass_and_constraint_rows():
-    """Moments about the hinge: weight -18 N m, force 1.5 N m, spring 3 · 0.1 N m, damper -0.5 · 2 N m. Over
-    0.5 + 2 · 1² = 2.5 kg m² their sum is the acceleration about z. The centre has ω² r = 4 m/s² towards the
-    hinge."""
+    """Moments about the hinge: weight -18 N m, force 1.5 N m, spring 3 · 0.1 N m, damper -0.5 · 2 N m. Their
+    sum over 0.5 + 2 · 1² kg m² is the acceleration about z; the centre has ω² r = 4 m/s²."""
     scene = pendulum()
     terms = terms_at(scene, gauss_motion(scene, (0.0,)), 0)
     assert list(terms.forces) == [

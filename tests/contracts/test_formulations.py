@@ -29,8 +29,7 @@ def system(m, n, redundant, seed=20031):
 
 
 def tolerance(formulation):
-    """Ten times what 40 random systems of each kind measured: alf stops at a change of 1e-9 (2e-9), the
-    others are off by rounding (6e-14)."""
+    """Ten times what 40 random systems of each kind measured: alf 2e-9, the others rounding, 6e-14."""
     return 2e-8 if formulation.name == "alf" else 6e-13
 
 
@@ -68,8 +67,7 @@ def test_five_iterations_of_a_small_penalty_are_too_few_for_alf_and_enough_for_a
 
 
 def test_accelerations_of_a_long_chain_by_alf_dual_are_exact_to_rounding():
-    """The start of a chain of ten loops against the judge's closed form. Long chains are ill-conditioned: the
-    rounding 1e-16 may be magnified by 1e4."""
+    """A chain of ten loops against the closed form; its condition may magnify the rounding 1e-16 by 1e4."""
     rounding = 1e-16 * 1e4  # of the largest acceleration
     scene = find_scene("four_bar_chain[10]")
     found = simulate(scene, "alf-dual+none", [0.0]).acceleration

@@ -55,8 +55,7 @@ def test_initial_velocities_satisfy_joints_and_drivers(name):
 
 @pytest.mark.parametrize("name", [n for n in CLOSED if SCENES[n]().body[0].angular_velocity is not None])
 def test_initial_velocities_keep_given_angular_velocities(name):
-    """Angular velocities of the scene file, which its joints allow, change by less than 1e-13 of the largest,
-    or of 1 rad/s: rounding."""
+    """They change by less than 1e-13 of the largest, or of 1 rad/s: rounding."""
     bodies = SCENES[name]().body
     _, spin = constraints.initial_twists(SCENES[name]())
     given = {k: each.angular_velocity for k, each in enumerate(bodies) if each.angular_velocity}

@@ -56,8 +56,7 @@ def test_contradicting_equations_have_the_least_squares_solution():
 
 @pytest.mark.parametrize("shape", [(0, 4), (3, 0), (3, 4)])
 def test_zero_or_empty_matrix_has_the_solution_zero_and_a_full_null_space(shape):
-    """Without equations (0 rows) or unknowns (0 columns), or with the coefficients zero; a full null space
-    has as many vectors as there are unknowns."""
+    """Without equations (0 rows) or unknowns (0 columns), or with the coefficients zero."""
     x, basis = least_norm_and_null_space(np.zeros(shape), np.zeros(shape[0]), TOLERANCE)
     assert not x.any() and basis.shape == (shape[1], shape[1])
 

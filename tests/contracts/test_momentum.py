@@ -97,9 +97,8 @@ def test_run_at_rest_has_no_momentum_drift():
 
 @pytest.mark.parametrize("probe", [None, "heavy top"], ids=["random scene", "probe of the suite"])
 def test_stored_violation_states_its_numbers_and_the_command_that_repeats_it(probe, tmp_path):
-    """ "my engine" fails the check truth by 0.25 where 1e-5 is allowed. The violation is stored as a scene
-    file whose comments have these numbers and a command of verify, with the probe's name or with this
-    file."""
+    """ "my engine" fails the check truth by 0.25 where 1e-5 is allowed. It is stored as a scene file whose
+    comments have these numbers and a command of verify, with the probe's name or this file."""
     verdict = Verdict("truth", "free", FAIL, 0.25, 1e-5, "off")
     path = findings.keep(SCENE, verdict, "my engine", tmp_path / "new", *([probe] if probe else []))
     numbers, command, *_ = path.read_text().splitlines()

@@ -134,8 +134,7 @@ def test_rk4_has_fourth_order_and_divides_the_interval_evenly() -> None:
 
 
 def test_solution_with_a_pole_ends_at_the_pole():
-    """y' = y², y(0) = 1: y = 1 / (1 - t) is 10 at 0.9, to rounding, and has no value at 1.1; the solution
-    ends at its pole t = 1, found to 1e-5."""
+    """y' = y², y(0) = 1: y = 1 / (1 - t) is 10 at 0.9, and the solution ends at t = 1, to 1e-5."""
     solution = Solution(lambda y: y**2, np.array([1.0]), 0.1)
     assert abs(solution(np.array([0.9]))[0, 0] - 10) < 1e-12
     with pytest.raises(NoSolution) as ended:

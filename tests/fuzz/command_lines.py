@@ -142,8 +142,7 @@ def _entries(folder: Path) -> set[str]:
 
 
 def _allowed(chosen: Command, words: Sequence[str]) -> set[str]:
-    """Return the entries of the working folder that a command line may make: those that it names, and the
-    default output of its command."""
+    """Return what a command line may write: the files that it names and its default output."""
     named = {Path(word).parts[0] for word in words if word and Path(word).parts}
     suffix = BY_ITSELF.get(chosen.name)
     default = {entry for entry in _entries_of_default(words, suffix)} if suffix else set()

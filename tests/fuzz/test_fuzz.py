@@ -12,8 +12,7 @@ LENGTHY = {"compare", "verify"}  # commands that run for minutes
 
 @pytest.mark.parametrize(("target", "count"), [("scene_file", 150), ("scene_data", 300)])
 def test_mutated_scene_is_accepted_or_refused_with_a_scene_error(target, count, tmp_path, monkeypatch):
-    """Each seed changes a right scene. A defect is another error than SceneError, with its place; both
-    endings, accepted and refused, occur."""
+    """Each seed changes a right scene. A defect is another error than SceneError; both endings occur."""
     monkeypatch.chdir(tmp_path)
     cases = {seed: targets.case(target, seed) for seed in range(count)}
     assert not {seed: defect for seed, (_, defect) in cases.items() if defect}

@@ -184,8 +184,7 @@ class Varying(Fake):
 
 
 class Searching(Fake):
-    """Compiles for its settings: writes to the file FAKE_LOG when that begins and ends, and waits a while for
-    a second process that does so."""
+    """Writes begin and end of its compilation to the file FAKE_LOG, and waits a while for a second one."""
 
     def settings(self, scene: Scene) -> list[Setting]:
         log = Path(os.environ["FAKE_LOG"])

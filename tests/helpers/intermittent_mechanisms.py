@@ -16,8 +16,7 @@ SHARE = 0.6  # fraction of the joints without drivers, couplings and armatures t
 
 
 def carts(**latch: Any) -> Scene:
-    """Two carts of 1 kg and 3 kg on a line, at 2 m/s and -1 m/s, that latch at 0.1 s and let go at 0.3 s;
-    other fields of the latch may be given."""
+    """Carts of 1 kg at 2 m/s and 3 kg at -1 m/s that latch from 0.1 s to 0.3 s, or as given."""
     return Scene(
         name="carts",
         duration=0.5,

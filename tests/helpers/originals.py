@@ -16,8 +16,7 @@ LEAST = 1e-4  # m: a shorter way is of a structure whose loops leave no motion
 
 
 def own_motion(model, found: Source, times, key: int = -1) -> np.ndarray:
-    """Centres of mass (k, nb, 3) of the scene's bodies: the file's masses, forces and rows, by MuJoCo.
-    ``key`` is the keyframe whose control values act."""
+    """Centres of mass (k, nb, 3) by MuJoCo from the file's terms; ``key`` is the controls' keyframe."""
     for name in OFF:
         model.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
     model.opt.jacobian, model.eq_solref[:] = mujoco.mjtJacobian.mjJAC_DENSE, NO_SOFTNESS

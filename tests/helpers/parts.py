@@ -23,8 +23,7 @@ def block(name: str, position: Point, mass: float = 1.5, **fields: Any) -> Entry
 
 
 def rod(name: str, start: Point, stop: Point, mass: float = 1.0) -> Entry:
-    """Return a rod of length l between two points: moments of inertia m l² / 12 across it and m l² / 1000
-    about it. Its axes are the world's."""
+    """Return a rod: m l² / 12 across it and m l² / 1000 about it. Its axes are the world's."""
     (x, y, z), (u, v, w) = start, stop
     length = np.linalg.norm(np.subtract(stop, start))
     across, thin = mass * length**2 / 12, 1e-3 * mass * length**2

@@ -69,8 +69,7 @@ class Mutant(NamedTuple):
 
 
 def mutants(file: str, source: str) -> list[Mutant]:
-    """Return all mutants of a file, in the order of their places; none of annotations, docstrings, texts and
-    imports for types alone."""
+    """Return all mutants of a file by place; none of annotations, docstrings, texts, type imports."""
     lines = source.encode().splitlines(keepends=True)
     starts = [sum(map(len, lines[:k])) for k in range(len(lines))]
 

@@ -87,8 +87,7 @@ class Copy:
 
     def tests(self, mutant: Mutant) -> list[Recorded]:
         """Return the tests that run the line of a mutant, the cheapest and closest first. Other tests of
-        their files come last: a line may run in the first test of a file alone, which keeps its result for
-        the others."""
+        their files come last: only the first test of a file may run a line."""
         wanted = places(self.place, PACKAGES, mutant)
         ordered = sorted(self._tests, key=Recorded.cost)
         first = [test for test in ordered if test.runs(wanted)]

@@ -53,8 +53,7 @@ def test_random_mutants_depend_on_the_seed_alone():
 @pytest.mark.slow
 def test_mutant_of_a_small_package_is_killed_by_the_test_that_runs_its_line(tmp_path):
     """total(2, 3) is tested. The test of the product, 3 · 1, passes with the quotient, too: this mutant
-    survives. A mutant that loops for ever counts as killed, and a test that fails without mutants is left
-    out."""
+    survives. One that loops for ever is killed; a test that fails without mutants is left out."""
     for name in ("mutants", "__init__.py"):
         (tmp_path / "tests").mkdir(exist_ok=True)
         (tmp_path / "tests" / name).symlink_to(ROOT / "tests" / name)

@@ -57,8 +57,7 @@ PSEUDO_INVERSES = {"svd": pinv_svd, "gram_schmidt": pinv_gram_schmidt}
 
 @st.composite
 def matrices(draw, most=40, condition=1e12):
-    """Return a matrix m × n, its rank, and its singular values that are not zero, from 1 to 1/condition; its
-    orthogonal factors are random."""
+    """Return a matrix m × n, its rank and its singular values from 1 to 1/condition; random factors."""
     m, n = draw(st.integers(1, most)), draw(st.integers(1, most))
     rank = draw(st.integers(1, min(m, n)))
     exponents = draw(st.floats(0, np.log10(condition)))

@@ -124,8 +124,7 @@ def test_both_branches_of_the_rhombus_move_side_by_side(parted):
 
 
 def test_branch_that_ended_early_says_so_and_stands_still(parted):
-    """Branch 2 ended by STEP_FAILED after 40 samples; its picture has the frames of all samples of branch 1,
-    of which those from the 40th on are equal."""
+    """STEP_FAILED after 40 samples: frames of all samples of branch 1, equal from the 40th on."""
     count, (first, second) = 40, sorted(parted.branches, key=lambda r: r["asked"]["options"]["branches"])
     bodies = {n: {k: v[:count] for k, v in body.items()} for n, body in second["bodies"].items()}
     times = second["times"][:count]

@@ -55,8 +55,7 @@ def test_default_rows_are_the_engines_with_a_run_of_defaults(section):
 
 
 def test_each_engine_s_runs_are_listed_with_one_command_a_mechanism(section):
-    """MuJoCo has two runs of the first mechanism, of which the best has the command. Pinocchio refused it,
-    without a command, and ran the second."""
+    """MuJoCo's best of two runs has the command. Pinocchio refused, without a command, and ran the second."""
     folds = {block.summary: block.blocks for block in section if isinstance(block, Fold)}
     table, text, commands = folds["mujoco 4.0.0"]
     assert isinstance(table, Table)

@@ -19,8 +19,7 @@ from tests.reports.synthetic import exact, motion, record, scene, truths
 
 
 def test_exact_run_is_drawn_on_the_exact_motion():
-    """Run and truth have equal frames, one for each sample. The crank keeps its length to 0.3 px, as
-    coordinates of both ends are rounded to 0.1 px."""
+    """Equal frames, one a sample. The crank keeps its length to 0.3 px; ends are rounded to 0.1 px."""
     crank = scene("planar_slider_crank")
     true = exact(crank)
     picture = mechanisms.over_truth(crank, true, true, "mujoco")
@@ -56,8 +55,7 @@ def test_still_picture_shows_the_largest_difference_of_a_run():
 
 
 def test_crank_turns_by_less_than_two_thirds_of_a_radian_between_drawn_frames():
-    """Frames are chosen so that a body turns by about 1/3 rad between them; a turn of twice that would look
-    broken. At most 91 frames are drawn."""
+    """A body turns by about 1/3 rad between frames; twice that looks broken. At most 91 frames."""
     planar = SCENES["planar_slider_crank"]().with_(duration=0.05)
     true = mechanisms.motion_of(planar, truth_record(planar, np.linspace(0, 0.05, 3), 20.0)["motion"])
     crank, *_ = bars(mechanisms.over_truth(planar, true, None, ""), BACKGROUND)

@@ -147,8 +147,7 @@ def installed(built, tmp_path_factory) -> Installed:
 
 @pytest.mark.slow
 def test_each_command_of_an_installed_wheel_ends_with_status_0_and_renders_a_report(installed):
-    """The command lines of COMMANDS ran in an environment that has the wheel, not the checkout; one of them
-    is `crosscheck report --render`."""
+    """COMMANDS ran in an environment of the wheel alone; one is `crosscheck report --render`."""
     assert len(installed.ends) == sum(map(len, COMMANDS.values()))
     for program, words, status, said in installed.ends:
         assert status == 0 and "Traceback" not in said, (program, words, status, said)

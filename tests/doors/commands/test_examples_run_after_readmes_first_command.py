@@ -52,8 +52,7 @@ def needed(name: str, extras: frozenset[str]) -> set[str]:
 
 @pytest.fixture(scope="module")
 def python(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the Python of a new environment that has links to the distributions that README's first command
-    installs, and no others."""
+    """Return the Python of a new environment with links to what README's first command installs."""
     readme = (ROOT / "README.md").read_text()
     extras = re.search(r"^python3 -m venv .*-e '\.\[([\w,-]+)\]' && .*crosscheck", readme, re.MULTILINE)
     assert extras, "README's first command installs the packages and writes a report"

@@ -76,8 +76,7 @@ def proofs() -> list[object]:
 
 @pytest.mark.parametrize("name", proofs())
 def test_the_proof_of_a_finding_gives_its_stored_number_at_the_stored_version(name: str) -> None:
-    """Within 5 %. A finding whose number rounding decides stores NaN: then the error need only be present.
-    Other versions of the library may be right."""
+    """Within 5 %, or present where rounding decides (NaN). Other versions of the library may be right."""
     (found,) = chosen([name])
     answer = found.recheck()
     if answer.version != found.version or found.crashes:

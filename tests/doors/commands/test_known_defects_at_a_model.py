@@ -32,8 +32,7 @@ def said(options: Mapping[str, Any], remedy: Mapping[str, Any], **conditions: An
 
 
 def test_defect_is_reported_where_its_remedy_mends_the_accelerations():
-    """The stone falls with 1.5 g, so that its acceleration is off by 0.5 of the right one; the remedy, the
-    factor 1, lets it fall with g."""
+    """The stone falls with 1.5 g: off by 0.5 of the right acceleration; with the factor 1 it falls with g."""
     (sentence,) = said({"factor": 1.5}, {"factor": 1.0}, versions=["1.0"])
     assert "1.0 falls too fast and is wrong there: set factor = 1" in sentence
     assert "off by 0.5 of the largest, otherwise by 0" in sentence

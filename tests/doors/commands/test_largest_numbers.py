@@ -52,8 +52,7 @@ def ended(capsys: pytest.CaptureFixture[str], *command: str) -> tuple[object, st
 @pytest.mark.parametrize("command", COUNTS, ids=" ".join)
 def test_count_outside_its_range_is_refused_with_the_range(command: tuple[str, ...], text: str, capsys):
     """COUNTS has the range of each option; NO_COUNTS are too large, negative, a fraction and a word. The last
-    line of the error is a screen's width or two long, also for a number of 5000 digits, of which 40 are
-    shown."""
+    line of the error is a screen's width or two long, with 40 of 5000 digits."""
     status, said = ended(capsys, *command, text)
     assert status == 2
     assert f"{command[-1]}: must be a whole number {COUNTS[command]}, got {text[:40]}" in said

@@ -96,8 +96,7 @@ def test_full_matrix_beyond_the_memory_of_the_machine_is_refused_with_its_size()
 
 
 def test_factorisation_of_500_rows_on_one_coordinate_is_refused_before_its_updates_take_2_gigabytes():
-    """All n rows are on one coordinate, so that each depends on each: n (n² - 1) / 6 = 20 833 250 updates. A
-    scene may have 20 million."""
+    """Each of n rows depends on each: n (n² - 1) / 6 = 20 833 250 updates, of 20 million allowed."""
     row, column = np.arange(500), np.zeros(500, dtype=int)
     with pytest.raises(InputError, match=r"500 constraint rows share bodies.* has 20833250 updates"):
         symbolic_factorisation(row, column, row, np.ones(1, dtype=bool))

@@ -54,8 +54,7 @@ def test_errors_print_no_control_character_of_a_word_of_the_command_line(program
 
 
 def test_errors_print_no_control_character_of_a_scene_file(tmp_path, capsys):
-    """In one file an escape character follows a value, in the other one it is part of a key. A message that
-    quoted the line or the key would print it."""
+    """An escape character follows a value, or is part of a key; a message that quotes it would print it."""
     (tmp_path / "faulty.toml").write_text('name = "x" \x1b[31m\n')
     (tmp_path / "key.toml").write_text('"na\\u001bme" = "x"\n')
     for name in ("faulty", "key"):

@@ -42,9 +42,8 @@ def test_file_that_mujoco_warns_about_leaves_no_log(command, text, status, tmp_p
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", ["four_bar", "four_bar_gravity"])
 def test_runs_and_modes_of_engines_leave_no_file(scene, tmp_path, monkeypatch):
-    """The statuses show that the commands ran, and were not refused with status 2: Exudyn's defaults end
-    early on these scenes, which is status 1, and `modes`, which asks all engines but mbref, finds
-    equilibria."""
+    """The commands ran, and were not refused (2): Exudyn's defaults end early, with status 1, and `modes`,
+    which asks all engines but mbref, finds equilibria."""
     monkeypatch.chdir(tmp_path)
     engines = [word for name in ("mbref", "mujoco", "pinocchio", "exudyn") for word in ("--engine", name)]
     assert crosscheck(["run", scene, *engines, "--samples", "3", "--duration", "0.01"]) == 1

@@ -141,8 +141,7 @@ def test_faulty_request_for_versions_is_refused_with_its_right_form(words, says,
 
 
 def test_names_that_an_adapter_uses_of_a_library_are_found_under_their_full_names():
-    """`t` is an alias of one.two. Names of json, which is Python's own, and of `self` are left out; so is
-    `.c`, as it belongs to a result of four()."""
+    """`t` is an alias of one.two. Names of json and of `self`, and `.c` of a result, are left out."""
     source = "import one.two as t\nfrom three import four\nimport json\nt.a.b(json.x)\nfour().c\nself.t.d\n"
     assert set(used_names(source)) == {"one.two", "three.four", "one.two.a", "one.two.a.b"}
 

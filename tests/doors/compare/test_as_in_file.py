@@ -203,8 +203,7 @@ def test_verdict_on_a_files_own_settings_states_the_tilt_of_an_axis_in_rad_besid
     ids=["right", "failed", "no truth"],
 )
 def test_verdict_on_right_failed_and_unjudged_runs_proposes_no_tuning(tmp_path, changes, says):
-    """Changed fields of the record: an error of 1e-9, which is right; an early end; no known error, so that
-    the verdict states the closures alone."""
+    """A right record, an early end, and no known error: then the verdict states the closures alone."""
     said = sentence(imported(tmp_path, FOUR_BAR, TILTED), **changes)
     assert says in said and "tune" not in said, said
 
@@ -245,8 +244,7 @@ def test_hold_refuses_a_body_that_hangs_on_another_body(tmp_path):
 
 
 def test_a_body_falls_freely_only_without_joints_and_spin_and_with_gravity():
-    """Only then its motion is g t² / 2. A joint to the ground holds it, a spin adds Euler's equations, and
-    without gravity nothing falls."""
+    """Else a joint holds it, a spin adds Euler's equations, or nothing falls without gravity."""
     top = SCENES["heavy_top"]()
     still = top.with_(joint=()).with_("body[0].angular_velocity", (0.0, 0.0, 0.0))
     assert falls_freely(still) and not falls_freely(still.with_(joint=top.joint))

@@ -1,5 +1,4 @@
-"""Differences of two sets of records are reported in sentences. Numbers just above a limit of noise differ,
-numbers just below do not."""
+"""Two sets of records differ, in sentences, just above a limit of noise and not just below."""
 
 import json
 from typing import Any

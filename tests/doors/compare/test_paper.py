@@ -55,8 +55,7 @@ STABILISATIONS = {"": "none", "B": "baumgarte", "CP": "partitioning"}  # Baumgar
 
 
 def test_every_cell_of_the_paper_has_a_run_of_its_method():
-    """A row "ALF + CP" of the paper's tables is the method alf+partitioning/adams; options of ALF stand in
-    brackets, which are left out here."""
+    """The row "ALF + CP" is the method alf+partitioning/adams; options in brackets are left out."""
     assert {label.row for label in runs.tables()} == {cell.row for cell in CELLS}
     for label, case in runs.tables().items():
         formulation, _, stabilisation = label.row.partition(" + ")

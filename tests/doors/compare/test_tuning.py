@@ -145,8 +145,7 @@ def test_family_that_timed_out_is_abandoned():
 
 @pytest.mark.parametrize(("bound", "settings"), [(2e-9, 0), (1e-11, 1)])
 def test_no_setting_reaches_an_error_below_the_truth_s_bound(bound, settings):
-    """A truth known to 2e-9 cannot show an error below 1e-10, so that no setting is found; one known to 1e-11
-    can. Runs have errors of 1e-15."""
+    """A truth known to 2e-9 cannot show an error below 1e-10, and one known to 1e-11 can."""
     known = {"metrics": {"error": 1e-15, "error_bound": bound}}
     engine = Modelled(lambda record: record | known, f=Family(order=4.0))
     assert len(tuned(engine.cases(0.001, 0.0005), 1e-10, engine).reached) == settings
@@ -154,8 +153,7 @@ def test_no_setting_reaches_an_error_below_the_truth_s_bound(bound, settings):
 
 def test_steps_are_limited_by_the_longest_interval_between_samples():
     """Steps end at samples: with samples at 0.1, 0.3 and 0.4 s, longer steps run as 0.2 s. ``within`` leaves
-    out longer steps; the longest one takes their place, with a gain beta ~ 1 / step. A tolerance is no
-    step."""
+    out them; the longest one is in their place, with beta ~ 1 / step."""
     assert longest_step([0.1, 0.3, 0.4]) == pytest.approx(0.2, rel=1e-14)
     assert longest_step([0.5]) == 0.5
     steps = [Setting("f", {"step": h, "beta": 0.2 / h}) for h in (0.4, 0.1, 0.025)]

@@ -66,8 +66,7 @@ def group(records=RECORDS, scene=REDUNDANT, **known: Any) -> Judged:
     ],
 )
 def test_grade_follows_from_the_error_of_a_completed_run(error, expected):
-    """Documented limits: right up to 1e-8 of the length, wrong above 1e-2. Without an error a run is
-    unjudged, and one that did not complete has failed."""
+    """Right up to 1e-8 of the length, wrong above 1e-2; unjudged without an error, failed if incomplete."""
     assert grade(record("a", "b", error)) is expected
     assert grade(record("a", "b", error, outcome="TIMED_OUT")) is Grade.FAILED
 
@@ -149,8 +148,7 @@ def test_runs_that_end_at_the_start_of_an_unknown_motion_are_not_judged():
 
 def test_engine_that_moves_another_mechanism_is_not_judged():
     """MuJoCo's run agrees with the truth to 4e-9, and the sentences on speed and on ends name MuJoCo. If the
-    check of models has found that MuJoCo moves another mechanism, they leave it out, and the run has no
-    grade."""
+    check of models finds another mechanism, they leave it out, and the run has no grade."""
     [found] = SITUATIONS["another mechanism"]
     assert "MuJoCo" in fast([group()]) and "MuJoCo" in breaks([group()])
     assert "MuJoCo" not in fast([found]) and "MuJoCo" not in breaks([found])

@@ -58,8 +58,7 @@ def test_every_tenth_mechanism_is_large(number, fewest, most):
 
 
 def test_each_difference_above_a_limit_in_the_stored_records_has_a_cause():
-    """A file lists causes by engine and ways. The records of all engines need exactly these causes, and each
-    finding that a cause names exists."""
+    """A file lists causes by engine and ways: the stored records need exactly these; findings exist."""
     shown = {each.cause for each in above(engines(read()))}
     assert shown == set(causes())
     assert {cause.finding for cause in causes()} - {""} <= {finding.name for finding in findings()}

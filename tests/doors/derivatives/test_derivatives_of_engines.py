@@ -34,8 +34,7 @@ WHIRLING = {"CONSTANT_INERTIA": RESTS, "NO_GYROSCOPIC": MOVES}  # shown by a bod
 
 
 def pinned() -> Scene:
-    """Return a moving body that turns and slides on a pin while a link of constant length holds it: a loop of
-    one freedom, with independent rows."""
+    """Return a body that turns and slides on a pin while a link of constant length holds it."""
     place = {"position": [0.4, 0.2, 0.1], "angular_velocity": [0.0, 0.0, 3.0]}
     pin = {"name": "pin", "type": "cylindrical", "bodies": ["ground", "b"], "anchor": [0.0, 0.0, 0.0]}
     link = {"name": "link", "type": "distance", "bodies": ["ground", "b"]}

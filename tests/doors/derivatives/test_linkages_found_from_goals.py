@@ -160,8 +160,7 @@ def test_points_that_no_arm_reaches_leave_the_residuals_of_their_mean():
 
 
 def test_points_without_times_determine_the_radius_of_an_arm_but_not_its_first_angle():
-    """The points are 1.2 m from the pivot, an eighth of a turn apart. Another angle of the arm at t = 0
-    passes them at other times."""
+    """Points 1.2 m from the pivot, an eighth of a turn apart; other first angles pass them at other times."""
     z = 1.2 * np.exp(1j * TURN * np.array([0.3, 0.425, 0.55]))
     points = {"arm.position.x": z.real, "arm.position.y": z.imag}
     found = mbref.synthesise(arm(), ARM, follow=points, starts=1)
@@ -199,8 +198,7 @@ def test_result_does_not_depend_on_units_nor_on_the_order_of_numbers():
 
 
 def test_least_torque_moves_the_mass_as_near_below_or_above_the_pivot_as_bounds_allow():
-    """The torque m g (x cos φ - y sin φ) of a steady turn has the mean square (m g)² (x² + y²)/2: y becomes 0
-    and x its lower bound."""
+    """The mean square of m g (x cos φ - y sin φ) is (m g)² (x² + y²)/2: y is 0 and x its lower bound."""
     times = np.linspace(0.0, 1.0, 17)[:-1]
     found = mbref.synthesise(
         arm(0.5, 0.2), ARM, least=["driver(A).torque"], bounds={ARM[0]: (0.1, 1.0)}, times=times, starts=1
@@ -224,8 +222,7 @@ def test_start_whose_crank_cannot_turn_is_left_for_a_random_one():
 
 
 def test_command_writes_the_scene_and_says_that_points_are_not_reached(tmp_path, capsys):
-    """The written scene has the numbers of the mean, (1.15, 0.2), of which x is at its bound 1.1; an empty
-    cell gives no condition."""
+    """The scene has the mean, (1.15, 0.2), with x at its bound 1.1; an empty cell gives no condition."""
     arm().save(tmp_path / "arm.toml")
     (tmp_path / "points.csv").write_text("time,arm.position.x,arm.position.y\n0.0,1.15,0.2\n1.0,1.15,\n")
     files = ["--follow", str(tmp_path / "points.csv"), "--out", str(tmp_path / "found.toml")]

@@ -55,8 +55,7 @@ def angle_of_pendulum(times, mass, inertia, x, y, gravity, start):
 
 
 def test_derivatives_of_a_pendulums_angle_equal_those_of_jacobis_function():
-    """``angle_of_pendulum`` is the closed form, differentiated by a complex step. The stated errors are at
-    least a tenth of the true ones."""
+    """The closed form is differentiated by a complex step; stated errors are at least a tenth of the true."""
     numbers = {"mass": 1.3, "inertia": 0.07, "x": 0.0, "y": 0.0, "gravity": -GRAVITY, "start": 0.0}
     paths = ["body[bob].mass", "body[bob].inertia[2]", "joint[A].anchor.x", "joint[A].anchor.y"]
     times = np.array([0.3, 1.7])
@@ -194,8 +193,7 @@ def test_driven_linkage_that_accelerates_from_rest_is_not_in_equilibrium():
 
 @pytest.mark.slow
 def test_derivative_in_other_units_is_scaled_by_the_units_of_output_and_number():
-    """A velocity by a length is in 1/s. The other units make each number of a time a quarter, and so this
-    derivative four times as large."""
+    """A velocity by a length is in 1/s. Times are a quarter, and so the derivative is four times as large."""
     mass, length, time = 8.0, 0.5, 0.25
     scene, times = powered_mechanism(2), np.array([0.02, 0.05])
     column, number = f"{scene.body[0].name}.velocity", f"joint[{scene.joint[-1].name}].anchor.x"

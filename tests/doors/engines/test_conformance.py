@@ -139,8 +139,7 @@ def test_table_of_verdicts_has_a_line_for_each_scene():
 
 
 def test_tables_of_verdicts_end_with_the_failures_and_a_summary():
-    """Of three scenes the door fails a check, the spring is refused ("cannot"), and the pendulum passes. A
-    scene that is not refused counts as run."""
+    """The door fails a check, the spring is refused ("cannot"), the pendulum passes: two scenes ran."""
     verdicts = [
         suite.Verdict("run", "door", "fail", reason="it crashed"),
         suite.Verdict("refusal", "spring", "cannot", reason="no springs"),

@@ -59,8 +59,7 @@ class Consistent:
         return phi, c.jacobian(self.t, self.frames) @ self.to_body, -bias
 
     def terms_of_mbref(self):
-        """Terms of mbref's model, whose bodies have principal frames, and the matrix (6 nb, 6 nb) from world
-        twists to twists in these frames."""
+        """mbref's terms in principal frames, and the matrix (6 nb, 6 nb) from world twists to theirs."""
         model = Model(self.scene)
         start = np.array([body.orientation for body in self.scene.body])
         principal = rotations.multiply(rotations.conjugate(start), model.orientation)
@@ -116,9 +115,8 @@ def differences(state: Consistent) -> Differences:
 @pytest.mark.parametrize("name", MECHANISMS)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_polynomials_mbref_and_judge_have_equal_constraints_of_mechanisms(name: str, seed: int) -> None:
-    """Three codes, in a state that was disturbed by 0.02 m and rad and projected onto the constraints.
-    Residuals are below 1e-13; row spaces and least-norm accelerations differ by at most ten times the
-    measured 2.1e-14 and 8e-13."""
+    """Three codes, in a state disturbed by 0.02 m and rad and then projected. Residuals are below 1e-13; row
+    spaces and least-norm accelerations differ by at most ten times the measured 2.1e-14 and 8e-13."""
     found = differences(Consistent(MECHANISMS[name], 0.001 * seed, seed, 0.02))
     assert found.phi < MARGIN * ROUNDING and found.spaces < MARGIN * SPACES
     assert found.accelerations < MARGIN * ACCELERATIONS

@@ -1,6 +1,5 @@
-"""Engines move copies of a four-bar as the four-bar: rotated, mirrored, bodies and joints in other orders,
-and the loop cut at each of its joints. Single and double precision of MJX and MuJoCo Warp are compared in
-test_ports.py."""
+"""Engines move copies of a four-bar as the four-bar: rotated, mirrored, in other orders, and cut at each
+joint. Single and double precision of MJX and MuJoCo Warp are compared in test_ports.py."""
 
 import functools
 

@@ -45,8 +45,7 @@ class Telescopic(Revolute):
 
 
 def hinged_body(**parts: tuple) -> Scene:
-    """Return a body on hinge J. ``parts`` replace fields of the scene without its checks, so that they may be
-    of types that a scene file cannot have."""
+    """Return a body on hinge J. ``parts`` replace fields unchecked, also by types that no file can have."""
     scene = Scene(name="hinged", body=(BODY,), joint=(JOINTS["revolute"],))
     return scene.model_copy(update=parts)
 

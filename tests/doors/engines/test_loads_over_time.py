@@ -52,8 +52,7 @@ def test_reference_formulations_displace_a_block_by_its_closed_form(formulation,
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_reference_formulations_turn_a_wheel_by_its_closed_form(formulation):
-    """From rest φ'' = M A sin(ω t + p) / I; integrated twice, φ grows up to 1.2 rad. The motion agrees to
-    1e-15 rad, its rounding to doubles."""
+    """From rest φ'' = M A sin(ω t + p) / I, integrated twice, up to 1.2 rad; to 1e-15 rad, rounding."""
     motion = FORMULATIONS[formulation](scenes.wheel(), TIMES, EXTENDED)
     assert not motion.reason
     turned = 2 * np.arctan2(*doubles(motion.orientation)[:, 0, [3, 0]].T)

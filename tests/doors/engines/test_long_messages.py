@@ -39,8 +39,7 @@ def test_message_is_cut_alike_in_this_process_and_in_a_child_process(name: str):
 
 
 def test_reason_of_10_megabytes_for_a_refusal_is_cut_to_its_beginning():
-    """The engine REFUSING gives LONG, 10 million characters, as its reason. Both functions that ask a child
-    process for it cut it alike."""
+    """REFUSING gives LONG, 10 million characters; both functions that ask a child cut it alike."""
     called = "tests.helpers.still_engines:REFUSING"
     _, cannot, _ = capabilities(called, resting("rest"), 60.0)
     assert cannot is not None and len(str(cannot)) < MOST and LONG[:500] in cannot.reason

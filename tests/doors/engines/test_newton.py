@@ -163,9 +163,8 @@ def chain() -> Scene:
     [("lox", pushed), ("semi-implicit", pushed), ("padmm, moreau", chain), ("mujoco", chain)],
 )
 def test_first_step_of_newton_has_the_reference_s_accelerations(family, make):
-    """The change of velocities over 1 ms / 1 ms, within 2 % of the reference's largest acceleration, by the
-    step's error of first order; a load of opposite sign, or in another frame or unit, changes them by
-    more."""
+    """The change of velocities over 1 ms / 1 ms, within 2 % of the reference's largest acceleration; a load
+    of opposite sign, in another frame or unit would change more."""
     scene, h = make(), 1e-3
     run = engine("newton").run(scene, np.array([0.0, h]), setting(family, h))
     exact = natural_motion(scene, [0.0], EXTENDED)

@@ -41,8 +41,7 @@ def test_tuned_pinocchio_stays_within_its_measured_error_of_the_truth(name, dura
 
 @pytest.mark.parametrize("name", ["planar_slider_crank", "four_bar", "five_bar"])
 def test_default_solver_of_pinocchio_diverges_with_redundant_closures(name: str) -> None:
-    """The scenes have redundant rows, on which one iteration of the default solver does not converge; the
-    message names them as the cause."""
+    """With redundant rows one iteration does not converge; the message names them as the cause."""
     run = simulate(SCENES[name](), 0.02, "defaults", step=1e-4)
     assert run.outcome is Outcome.NOT_FINITE, f"{name}: {run.outcome.label}"
     assert "redundant" in run.message, f"message {run.message!r}"

@@ -94,9 +94,8 @@ def error(run: Trajectory) -> float:
 @pytest.mark.parametrize("bodies", ORDERS, ids="-".join)
 @pytest.mark.parametrize("name", FREE)
 def test_block_on_an_incline_moves_and_reacts_as_its_closed_form(name: str, bodies: tuple[str, str]) -> None:
-    """The block's centre falls along the plane, and the block spins steadily about the normal. The reaction
-    is -m (g · n) n, of 18 N, with the moment at the anchor by Euler's equations. Errors are at most ten times
-    those of MEASURED."""
+    """The centre falls along the plane, the block spins about the normal. The reaction is -m (g · n) n, of 18
+    N, with the moment at the anchor by Euler's equations. Errors are at most ten times those of MEASURED."""
     run = run_fine(name, incline(bodies), TIMES)
     assert error(run) < CLOSE[name]
     assert np.abs(run.reactions["plane0"] - exact_wrenches(bodies)).max() < MARGIN * MEASURED[name][1]
@@ -177,8 +176,7 @@ def referred(scene: Scene) -> Reference:
 @pytest.mark.parametrize("joints", [1, 2])
 @pytest.mark.parametrize("bodies", ORDERS, ids="-".join)
 def test_reference_of_a_block_on_an_incline_is_the_closed_form(bodies: tuple[str, str], joints: int) -> None:
-    """Within the bound that the reference states, at most 1e-12. One planar joint is in the tree of
-    formulation B; a second one closes a loop."""
+    """Within the stated bound, at most 1e-12; a second joint closes a loop of formulation B's tree."""
     found, (position, orientation) = referred(incline(bodies, joints)), exact_poses()
     allowed = found.bound.max()
     assert np.abs(found.position[:, 0] - position).max() <= allowed

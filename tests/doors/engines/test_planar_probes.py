@@ -30,8 +30,7 @@ def loops(scene: Scene) -> int:
 
 def test_planar_engine_is_run_on_the_loops_of_25_planar_probes():
     """Planar probes are five mechanisms with each of six parts. An engine of hinges along z and slides can
-    run those without a torsion spring, 5 · 5, and no loop (more joints than bodies) of the other
-    specimens."""
+    run those without a torsion spring, 5 · 5, and no loop of others."""
     scenes = [specimen.scene for specimen in find_specimens(None, 0.0, ENGINE)]
     able = [s for s in scenes if PLANAR.cannot(s) is None and loops(s) > 0]
     mapped = {name for name in planar_loops() if not name.endswith("torsion spring")}
@@ -41,8 +40,7 @@ def test_planar_engine_is_run_on_the_loops_of_25_planar_probes():
 
 @pytest.mark.parametrize("name", ["pinocchio", "mujoco"])
 def test_spatial_engine_gets_planar_probes_only_by_name(name):
-    """MuJoCo and Pinocchio map joints in space: by default no probe is planar. A request by its name gives a
-    planar one, here a four-bar with a spring."""
+    """MuJoCo and Pinocchio map joints in space. A request by name gives a planar four-bar with a spring."""
     assert not is_planar(engine(name))
     assert not {s.scene.name for s in find_specimens(None, 0.0, name)} & set(planar_loops())
     assert find_specimens(["planar four-bar: spring"], 0.0, name)[0].scene.load

@@ -54,8 +54,7 @@ def test_two_ball_hinges_share_only_the_force_along_their_line():
 
 
 def test_two_revolute_hinges_share_all_five_components():
-    """Each hinge alone holds the door, so that statics leaves all five components of either open; neither has
-    a moment about the axis, to 1e-12."""
+    """Each hinge alone holds the door: all five components are open; no moment about the axis, to 1e-12."""
     shared = shared_wrenches(door(Revolute), 0.0, *initial_poses(door(Revolute)))
     assert {name: basis.shape[1] for name, basis in shared.items()} == {"low": 5, "high": 5}
     assert max(np.abs(basis[5]).max() for basis in shared.values()) < 1e-12

@@ -75,8 +75,7 @@ def test_ida_stops_at_the_singular_position_of_a_driven_four_bar() -> None:
 
 
 def test_row_redundant_only_at_the_start_ends_the_run_with_a_violation() -> None:
-    """The straight four-bar starts flat, where one row more is dependent than later: IDA gets too few rows,
-    and the joints open beyond the limit."""
+    """The straight four-bar starts flat, with one more dependent row: IDA gets too few, and joints open."""
     run = simulate(SCENES["four_bar_straight"](), 0.02, 1e-6)
     assert run.outcome is Outcome.VIOLATION, f"{run.outcome.label}: {run.message}"
 

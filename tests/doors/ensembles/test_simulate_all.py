@@ -1,5 +1,4 @@
-"""Ensembles that are simulated together: all numbers of a run (``results``) equal those of a single run to
-the bit, also if it fails."""
+"""Runs of ensembles equal single runs in all numbers (``results``), to the bit, also if they fail."""
 
 import pickle
 from itertools import permutations
@@ -151,8 +150,7 @@ def test_scenes_of_one_shape_with_different_independent_rows_together_equal_sing
 
 
 def test_variants_of_springs_and_full_inertias_together_equal_single_runs():
-    """Six variants with principal moments of inertia are one batch, so that five join the first; six with
-    products of inertia are another."""
+    """Six variants with principal moments of inertia are one batch, six with products another."""
     points = ((0.3, 0.2, 0.0), CRANK.body[1].position)
     spring = Spring(bodies=("ground", "rod"), points=points, stiffness=50.0, natural_length=0.1)
     sprung = CRANK.with_(load=(*CRANK.load, spring))

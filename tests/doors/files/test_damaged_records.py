@@ -38,8 +38,7 @@ def record_with(field: str, value: Any = None) -> bytes:
 
 
 def refused(capsys: pytest.CaptureFixture[str], place: Path) -> str:
-    """Return the message of `report --render`, which ends with status 2 and one sentence that names the
-    file of records, as `crosscheck diff` must, too."""
+    """Return the message of `report --render`, one sentence with status 2, as `crosscheck diff`'s must be."""
     assert report(["--render", str(place)]) == 2
     rendering = capsys.readouterr().err
     assert crosscheck(["diff", str(place), str(place)]) == 2
@@ -52,8 +51,7 @@ def refused(capsys: pytest.CaptureFixture[str], place: Path) -> str:
 
 @pytest.mark.parametrize("content", FOREIGN, ids=lambda content: ascii(content[:8]))
 def test_records_file_of_other_content_is_named(content, tmp_path, capsys):
-    """Null, nested, empty or foreign JSON, bytes that are no UTF-8, and an escape character. Both commands of
-    ``refused`` refuse each of them."""
+    """Null, nested, empty or foreign JSON, no UTF-8, an escape character, by both commands of ``refused``."""
     assert "holds no records" in refused(capsys, folder(tmp_path / "r", content))
 
 
@@ -174,8 +172,7 @@ of_each_table = pytest.mark.parametrize(
 
 @of_each_table
 def test_table_of_records_names_a_record_that_it_cannot_show(command, record, tmp_path, capsys):
-    """The record is right, and of a mechanism or experiment that is not in the table: the table is printed,
-    and a line names the record."""
+    """A right record of a mechanism or experiment that the table lacks: a line names it below the table."""
     lost = {**record, "key": "k2", "engine": "none", "row": "none, tuned", "experiment": "none"}
     assert table(command, tmp_path, lost) == 0
     assert capsys.readouterr().err == "no row and column of the table has record 'k2'\n"

@@ -62,8 +62,7 @@ def acceleration_difference(scene: Scene, path: Path) -> float:
 
 
 def in_frames_of(scene: Scene, trajectory: Trajectory, own: Scene) -> Trajectory:
-    """Return a trajectory of the scene ``own`` as one of ``scene``, which has the same bodies in another
-    order and with other body axes."""
+    """Return a trajectory of ``own`` as one of ``scene``, with bodies in another order and other axes."""
     places = [trajectory.bodies.index(body.name) for body in scene.body]
     theirs = np.array([own.body[p].orientation for p in places])
     ours = np.array([body.orientation for body in scene.body])
@@ -218,8 +217,7 @@ def test_roll_pitch_and_yaw_of_a_loop_turn_its_axis(tmp_path):
 
 
 def test_import_writes_a_scene_that_export_writes_as_mjcf(tmp_path, capsys):
-    """The model has a spring of 40 N/m, which the scene has, and two motors, which are left out. Scene and
-    exported file have equal counts."""
+    """The model has a spring of 40 N/m, which stays, and two motors, left out. Counts are equal."""
     assert main(["import", str(MODELS / "five_bar.xml"), "--out", str(tmp_path / "five.toml")]) == 0
     assert "left out: 2 actuators" in capsys.readouterr().out
     assert Scene.from_file(tmp_path / "five.toml").load[0].stiffness == 40

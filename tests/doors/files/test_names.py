@@ -91,8 +91,7 @@ def test_control_characters_in_names_and_endless_names_are_refused_in_short_mess
 
 @pytest.mark.parametrize("name", NAMES)
 def test_page_and_markdown_of_a_report_show_a_name_without_acting_on_its_markup(name):
-    """A parser of CommonMark finds no HTML, link or emphasis, and the heading's text is the name without its
-    backticks, which mean code on purpose."""
+    """CommonMark finds no HTML, link or emphasis; the heading is the name without backticks (code)."""
     card = Card("k-1", name, "right", "✓", {}, name, shlex.join(["crosscheck", "run", name]), name)
     verdict = Verdict(name, name, name, [name], "", "")
     blocks = [

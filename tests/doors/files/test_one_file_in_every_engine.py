@@ -245,8 +245,7 @@ def test_rows_that_do_not_hold_the_loop_are_named(arm, change, name, field, tmp_
 
 
 def read_without_mimics(folder: Path, capsys: Any) -> dict[str, Any]:
-    """Return the JSON of `crosscheck files`, with exit status 1, for a reader that leaves out mimics with a
-    message, and friction without one."""
+    """Return the JSON of `crosscheck files`, status 1, of a reader that drops mimics with a message."""
     case = next(case for case in CASES if (case.form, case.name) == (URDF, "mimic offset"))
     text = case.text.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><dynamics friction="0.2"/>', 1)
     path = written(folder, text, "robot.urdf")
@@ -301,8 +300,7 @@ def test_unknown_reader_of_files_is_refused_with_the_nearest_name(tmp_path: Path
 
 def test_own_import_reads_public_files_of_robots_or_refuses_them_by_name():
     """The stored records are of at least 60 files of 12 packages. Each file gives the same machine except for
-    limits and friction of joints, or is refused in words, which name no folder of the computer that read
-    it."""
+    limits and friction of joints, or is refused in words, which name no folder."""
     found = [record for record in public.read() if record["reader"] == "mbref"]
     assert len(found) >= 60 and len({record["package"] for record in found}) >= 12
     for record in found:

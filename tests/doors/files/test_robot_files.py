@@ -105,9 +105,8 @@ def test_robot_file_gives_its_freedoms_and_leaves_out_dampings_only(name):
     "name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in sorted(FREEDOMS)]
 )
 def test_scene_of_a_robot_file_moves_as_mujoco_s_model(name):
-    """The judge moves the scene; MuJoCo's masses, forces and rows of the file are integrated finely, and
-    loops that MuJoCo does not read are added to its model here. Centres of mass differ by less than 1e-9 of
-    the largest way."""
+    """The judge moves the scene; MuJoCo's terms of the file are integrated finely, with loops added that it
+    does not read. Centres of mass differ by less than 1e-9 of the largest way."""
     found = read(name)
     assert apart(original(name, found), found, END) < SAME
 
@@ -148,6 +147,5 @@ MAKERS = (random_models.mjcf, random_models.urdf)
 )
 @pytest.mark.parametrize("make", MAKERS, ids=["mjcf", "urdf"])
 def test_scenes_of_random_files_move_as_mujoco_s_models(make, seeds, least, tmp_path):
-    """At least ``least`` files are read, and the scenes move as MuJoCo's models to SAME, 1e-9; the others are
-    refused for a reason in REFUSALS."""
+    """At least ``least`` files are read and move as MuJoCo's, to SAME; REFUSALS has the others' reasons."""
     assert sum(random_file_moves_alike(make, seed, tmp_path) for seed in seeds) >= least

@@ -108,8 +108,7 @@ def test_fault_found_by_a_run_states_the_line_of_its_entry(tmp_path, capsys):
     ],
 )
 def test_wrong_or_empty_command_line_ends_with_status_2_and_says_what_to_type(capsys, words, says):
-    """A misspelt word is answered with the nearest known one, a number with a unit with its fault, and no
-    words with examples of commands."""
+    """A misspelt word has the nearest one, a number with a unit its fault, no words have examples."""
     with pytest.raises(SystemExit) as ended:
         main(words)
     assert ended.value.code == 2 and says in capsys.readouterr().err
@@ -140,8 +139,7 @@ def turning(rate: float | str) -> list[dict]:
     ],
 )
 def test_probable_slip_is_one_sentence(path, value, slip):
-    """Gravity in mm/s², inertia in kg mm², an anchor in mm, a mechanism without joints, and a driver that
-    turns by more than 100 rad in 1 s."""
+    """Gravity in mm/s², inertia in kg mm², an anchor in mm, no joints, a driver beyond 100 rad in 1 s."""
     scene = find_scene("planar_slider_crank").with_(duration=1.0, load=())
     [found] = probable_slips(scene.with_(path, value))
     assert found.startswith(slip)
@@ -256,8 +254,7 @@ def test_rate_of_a_driver_of_whole_quarters_of_a_turn_is_a_probable_slip_of_degr
 
 
 def test_shipped_schema_is_generated_from_the_model_and_has_every_field():
-    """The package's file is what `mbref schema` prints: a property for each field of a scene, and the fields
-    that a hinge requires."""
+    """`mbref schema` prints it: a property for each field of a scene, and what a hinge requires."""
     shipped = json.loads((files("mbref") / "templates" / "scene.schema.json").read_text())
     assert shipped == schema(), "mbref schema > mbref/templates/scene.schema.json renews it"
     assert set(shipped["properties"]) == set(Scene.model_fields)

@@ -105,8 +105,7 @@ def test_joints_of_a_mimic_with_an_offset_start_at_angles_that_obey_it(files):
     ("ratio", "reference", "offset"), [(3, 0.1, 0.3), (0.1, 0.7, 0.07), (-1.1, 1.1, -1.21)]
 )
 def test_an_offset_of_a_mimic_joint_that_is_only_rounding_is_exactly_zero(files, ratio, reference, offset):
-    """The coupling's offset is offset - ratio · reference. In decimals it is zero here, as 0.3 - 3 · 0.1 is;
-    in binary numbers it would be a rounding."""
+    """offset - ratio · reference is zero in decimals, as 0.3 - 3 · 0.1 is, and a rounding in binary."""
     scene, _ = files.scene(pair(mimics("lead", ratio, offset, reference)), "pair.sdf")
     assert scene.coupling[0].offset == 0.0
 

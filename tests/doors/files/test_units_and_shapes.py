@@ -94,8 +94,7 @@ def test_number_with_a_unit_is_the_number_in_si_to_the_last_digit(path, text, nu
 
 def test_every_number_may_have_a_unit_except_directions_and_pure_numbers():
     """The schema allows a text wherever a number may have a unit. ``pure`` lists pure numbers: quaternions,
-    coefficients that multiply a load, and coefficients of restitution. Fields of joints that begin with "ax"
-    are directions."""
+    coefficients of loads and of restitution. Fields of joints that begin with "ax" are directions."""
     whole = schema()
     fields = {
         f"{table}.{field}"
@@ -139,8 +138,7 @@ def grid(*bounds, points=8):
 
 
 def solid(shape):
-    """Return points (n, 3) and volumes (n,) by which sums over a shape with the axis z are integrals, exact
-    for moments of second order."""
+    """Return points (n, 3) and volumes (n,) whose sums are integrals over a shape, up to second order."""
     if shape["type"] == "box":
         return grid(*((-edge / 2, edge / 2) for edge in shape["size"]))
     if shape["type"] == "sphere":

@@ -111,16 +111,14 @@ def test_a_moment_of_inertia_larger_than_the_two_others_together_is_refused(file
 @pytest.mark.parametrize("excess", [0.0, 1e-16, 1e-13, 1e-10])
 def test_inertia_of_a_flat_link_is_read_though_rounding_makes_it_impossible(files, excess):
     """A flat link has 0.3 = 0.1 + 0.2 kg m². A file may have a largest moment that is greater by a relative
-    ``excess``, which no body has; the moments are read as those of a flat link, to 1e-9 of the
-    largest."""
+    ``excess``, which no body has; it is read as a flat link, to 1e-9."""
     moments = f'ixx="0.1" ixy="0" ixz="0" iyy="{0.3 * (1 + excess)!r}" iyz="0" izz="0.2"'
     scene, _ = files.scene(robot(*CRANKS).replace(MOMENTS, moments, 1), "r.urdf")
     assert np.diag(scene.body[0].inertia) == pytest.approx(np.diag([0.1, 0.3, 0.2]), abs=3e-10)
 
 
 def test_prefix_without_a_declaration_is_read_as_by_parsers_without_namespaces(files):
-    """Robots have elements and attributes of tools, such as ``drake:``. The scene is that of the file without
-    them; the comment is no element."""
+    """Elements and attributes of tools, such as ``drake:``, do not change the scene; nor do comments."""
     limit = '<limit tool:acceleration="2" effort="1" velocity="1"/>'
     bare = limit.replace('tool:acceleration="2" ', "")
     plain = robot(hinge("ja", "base", "a", "0 0 0", more=bare), *CRANKS[1:])

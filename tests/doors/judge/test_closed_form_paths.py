@@ -129,8 +129,7 @@ def test_path_of_a_spatial_slider_crank_closes_its_joints(line, order, reverse, 
 
 @of_cranks
 def test_path_of_a_spatial_slider_crank_begins_at_the_pose_of_the_scene(line, order, reverse, way):
-    """At the crank's angle 0, positions (m) and rotation matrices are those that the scene states, to 1e-13:
-    hundred times the measured rounding."""
+    """At the crank's angle 0, positions (m) and rotation matrices are the scene's, to 1e-13."""
     given = spatial(line, order, reverse, way)
     pose = spatial_slider_crank(given).poses(np.zeros(1, np.longdouble))
     assert np.abs(pose.position[0] - [b.position for b in given.body]).max() < CLOSED

@@ -24,8 +24,7 @@ ALLOWED = 2 * LIMIT + 2.0  # s of CPU time: twice the limit, and 2 s for the set
 
 
 def uneven_five_bar() -> Scene:
-    """Return the paper's driven five-bar with errors of 1e-8 m in its anchors, which make its first singular
-    position hard to pass."""
+    """Return the paper's driven five-bar with anchors off by 1e-8 m, which make its singularity hard."""
     return settings.imprecise(settings.kinematic(SCENES["five_bar"]()), 1e-8, 0)
 
 
@@ -48,8 +47,7 @@ def cpu_seconds(work: Callable[[], object]) -> float:
 
 @pytest.mark.parametrize("name", HARD)
 def test_search_for_a_reference_ends_at_its_limit_of_cpu_time(name):
-    """HARD has scenes whose references need more than the limit of 1 s. The search ends with the reason OVER
-    within the CPU time ALLOWED, 4 s."""
+    """HARD need more than the limit of 1 s: the reason is OVER, within the CPU time ALLOWED, 4 s."""
     make, end = HARD[name]
     scene, times = make(), np.linspace(0.0, end, 101)
     motions = []

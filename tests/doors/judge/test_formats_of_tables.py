@@ -175,8 +175,7 @@ def engineering(number: float) -> str:
 )
 def test_quaternions_of_random_signs_are_right_at_rounded_times_in_any_format(form, axes, tmp_path):
     """The rod turns by 16 t rad, its centre is 0.5 m from the hinge, and times are random. Signs of
-    quaternions are, too, as q and -q are one orientation. With the opposite sign of a velocity, this column
-    is off."""
+    quaternions are, too. With the opposite sign of a velocity, its column is off."""
     rng, names = np.random.default_rng(4), [f"rod.orientation.{a}" for a in axes]
     times = np.sort(rng.uniform(0.0, 1.0, 30))
     sign, angle = rng.choice([-1.0, 1.0], 30), 16 * times
@@ -204,8 +203,7 @@ def test_bodies_are_told_apart_by_the_case_of_letters_under_any_lines(above: str
 
 def test_rows_after_the_end_of_the_reference_are_not_right(tmp_path: Path, capsys) -> None:
     """The pendulum starts at rest, so that its angle is below 1e-4 rad in the first 2 ms. One CPU s reaches
-    some of its 1000 s, also on slow processors. The invented last row makes the exit status 1, though rows
-    before are right."""
+    some of its 1000 s, also on slow processors. The invented last row makes the exit status 1."""
     double_pendulum().with_(duration=1000.0).save(tmp_path / "scene.toml")
     path = tmp_path / "run.csv"
     rows = "time,A.angle\n0,0.000000\n0.001,0.000000\n0.002,0.000000\n1000,7.000000\n"

@@ -75,8 +75,7 @@ BALANCED = {
 @pytest.mark.parametrize("balanced", BALANCED)
 def test_engines_pass_the_comparison_where_forces_balance_to_rounding(balanced, name):
     """``gate`` finds no difference, None, between an engine's short run and Gauss's principle. Where forces
-    balance, changes of velocity are rounding; their differences are relative to a free fall, not to the
-    largest change."""
+    balance, differences of velocity are relative to a free fall."""
     scene = BALANCED[balanced]
     setting = engine(name).best_settings(scene)[-1]
     run = run_once(name, scene, gate_times(scene), setting)

@@ -91,8 +91,7 @@ def test_many_random_motions_through_impacts_agree_with_the_reference(seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(0, 200, 10))
 def test_both_formulations_of_the_reference_move_random_mechanisms_alike_through_impacts(seed):
-    """Natural coordinates and the tree of joints share no equations of motion. Positions agree to 1e-11 m,
-    100 times the rounding of a reference."""
+    """The formulations share no equations. Positions agree to 1e-11 m, 100 times a reference's rounding."""
     scene = intermittent_mechanism(seed)
     one, other = (motion_by(f, scene, TIMES, EXTENDED) for f in FORMULATIONS.values())
     k = min(len(one.times), len(other.times))
@@ -100,8 +99,7 @@ def test_both_formulations_of_the_reference_move_random_mechanisms_alike_through
 
 
 def test_wrong_impulse_velocity_and_energy_of_an_impact_are_measured_by_a_metric_each():
-    """An impulse is made larger by a hundredth, a velocity or an energy after the latch by a tenth. The
-    unchanged impact has errors of rounding."""
+    """An impulse is a hundredth larger, a velocity or energy behind it a tenth; unchanged: rounding."""
     scene, run = carts(), mbref.simulate(carts(), times=[0.0, 0.2, 0.5])
     latched = run.events[0]
     changes = {

@@ -121,8 +121,7 @@ def test_run_of_a_body_that_the_scene_lacks_is_refused():
 
 @pytest.mark.parametrize("order", [0.75, 1, 2, 4, 8])
 def test_order_of_convergence_is_the_power_put_in_above_a_floor(order):
-    """Errors 3 h^p with 10 % scatter, down to a floor of 1e-13; the first error is not asymptotic. The
-    scatter moves the fitted order by less than 0.1."""
+    """3 h^p with 10 % scatter, which moves the order by less than 0.1, and a floor of 1e-13."""
     steps = 0.5 / 2.0 ** np.arange(12)
     scatter = 1 + 0.1 * np.sin(7 * np.arange(12))
     errors = np.maximum(3 * steps**order * scatter, 1e-13)
@@ -151,8 +150,7 @@ COSTS, ERRORS = [1.0, 10.0, 100.0, 50.0], [1e-2, 1e-4, 1e-6, 1e-3]  # error = 1e
     ids=["between two runs", "above the cheapest run's error", "below all errors"],
 )
 def test_cost_at_an_error_is_read_on_the_lower_envelope_of_the_runs(level, cost):
-    """Between runs on the line error = 1e-2 / cost² (cost = √(1e-2 / level)); a worse run has no effect. The
-    cheapest run costs 1; no run reaches 1e-7."""
+    """error = 1e-2 / cost² between runs; a worse run has no effect; the cheapest costs 1; 1e-7 is not met."""
     assert cost_at_error(COSTS, ERRORS, level) == pytest.approx(cost)
 
 

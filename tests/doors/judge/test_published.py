@@ -95,8 +95,7 @@ def test_sarrus_platform_stays_level_and_on_its_line():
 
 @pytest.mark.slow
 def test_andrews_reference_of_the_test_set_is_wrong_from_the_eleventh_digit():
-    """The printed β at the end, 15.8107711962 rad in its first twelve digits, is 1.1e-9 to 1.2e-9 rad off the
-    judge's integration in extended precision."""
+    """The printed β at the end, 15.8107711962 rad, is 1.1e-9 to 1.2e-9 rad off the judge's."""
     problem = PUBLISHED["A03"]
     motion = natural_motion(find_scene(problem.scene), problem.times(), EXTENDED, seconds=SECONDS)
     deviation = problem.deviations(motion)

@@ -116,8 +116,7 @@ def turning(angles: tuple[tuple[float, float], ...]) -> Trajectory:
 
 
 def test_opposite_hinges_measure_is_the_largest_sum_of_both_angles():
-    """Angles of hinges A and B at three samples; in the published mechanism their sum stays zero. A sum of
-    zero is exact to a rounding, 1e-15 rad."""
+    """Angles of A and B at three samples; the published sum stays zero, exact to a rounding, 1e-15 rad."""
     pair = measures.opposite_hinges([("A", "B")])
     assert pair(SCENE, turning(((0.0, 0.0), (0.2, -0.2), (0.5, -0.5))), None) == pytest.approx(0.0, abs=1e-15)
     assert pair(SCENE, turning(((0.0, 0.0), (0.2, -0.3), (0.5, -0.44))), None) == pytest.approx(0.1)

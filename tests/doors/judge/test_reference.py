@@ -87,8 +87,7 @@ def test_bound_of_a_mechanism_far_from_the_origin_holds_the_rounding_of_its_samp
 )
 def test_reference_is_within_its_bound_of_a_known_motion(name):
     """The error is the difference from the closed form. The bound is at most 1e-12 of the length or rad, or
-    4e-10, ten times the largest measured, for motions over singular positions (SINGULAR), which magnify
-    rounding."""
+    4e-10, ten times the largest measured, over singular positions (SINGULAR)."""
     scene = ALL[name]
     found, reason = samples(scene, BRIEF.get(name, scene.duration))
     truth = closed_form(scene)
@@ -193,8 +192,7 @@ def test_twenty_digits_are_certified_by_both_formulations():
     ],
 )
 def test_thirty_digits_and_extended_precision_move_alike(make, times):
-    """Formulation A in 30 and in 19 digits: rounded to doubles, positions up to 1 m agree to 1e-15 m,
-    whatever the loads and joints."""
+    """Formulation A in 30 and in 19 digits: positions up to 1 m, rounded to doubles, agree to 1e-15 m."""
     pytest.importorskip("flint", reason="python-flint is the extra `certify`")
     scene = make()
     motion = natural_motion(scene, times, many_digits(30), order=30, tolerance=1e-20, seconds=SECONDS)

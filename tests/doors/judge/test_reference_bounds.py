@@ -42,9 +42,8 @@ def test_reference_of_a_hard_mechanism_is_within_its_bound_of_thirty_digits(name
 
 @pytest.mark.parametrize("move", [natural_motion, tree_motion])
 def test_given_rate_near_a_singular_position_is_kept_to_1e_17(move):
-    """The crank is given 1e-3 rad/s near its singular position, which magnifies errors of the start.
-    Velocities solved in double precision would be off by 1e-16 rad/s, in extended precision by up to 1e-18
-    rad/s."""
+    """The crank is given 1e-3 rad/s near its singular position, which magnifies errors of the start. In
+    double precision they would be off by 1e-16 rad/s, in extended by up to 1e-18."""
     motion = move(HARD["start_near_singular"](), [0.0], EXTENDED, seconds=SECONDS)
     assert np.abs(motion.angular_velocity[0, 0] - EXTENDED.array([0.0, 0.0, 1e-3])).max() < 1e-17
 

@@ -58,9 +58,8 @@ def turned(name: str, digits: int | None) -> Scene:
 @pytest.mark.parametrize("digits", [6, 8])
 @pytest.mark.parametrize("name", LOOPS)
 def test_rounded_loop_is_closed_and_keeps_its_redundant_rows(name, digits):
-    """Both bodies of a joint get its rounded point and axis, so that the joint is closed to
-    double rounding. Rank and redundant rows are those in full digits, and singular values beyond the rank are
-    double rounding."""
+    """Both bodies of a joint get its rounded point and axis, so that the joint is closed to double rounding.
+    Rank and redundant rows are those in full digits; the other singular values are rounding."""
     scene, whole = turned(name, digits), turned(name, None)
     gaps = closure(scene, np.zeros(1), *(a[None] for a in initial_poses(scene)))
     assert max(np.abs(rows).max() for rows in gaps.values()) < 1e-14  # m, rad: 50 roundings of 1

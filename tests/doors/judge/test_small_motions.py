@@ -65,8 +65,7 @@ def test_judge_finds_the_frequency_on_a_spring_far_shorter_than_the_mechanism():
 
 
 def test_steady_poses_are_balanced_with_symmetric_positive_mass_matrix(judged):
-    """Unbalanced forces are rounding, below 1e-13 N or N m; eigenvalues are conjugate pairs, as of real
-    equations, to 1e-14 of the largest."""
+    """Unbalanced forces are below 1e-13 N or N m; eigenvalues are conjugate pairs, to 1e-14."""
     _, found = judged
     for each in found:
         assert np.abs(each.balance.unbalanced(each.state).astype(float)).max() < 1e-13
@@ -212,8 +211,7 @@ def test_stored_records_have_every_mechanism_and_errors_of_rounding():
 
 
 def test_modes_command_compares_a_scene_with_an_engine(tmp_path, capsys):
-    """The table has the pose, the engine's own and the judge's eigenvalues; JSON has mbref's error, at most
-    1e-11, which is rounding."""
+    """The table has pose and eigenvalues of engine and judge; JSON has mbref's error, at most 1e-11."""
     path = str(tmp_path / "my.toml")
     pendulum().save(path)
     assert main(["modes", path, "--engine", "mujoco", "--starts", "3"]) == 0

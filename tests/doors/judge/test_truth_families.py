@@ -34,8 +34,7 @@ def test_built_in_scene_has_the_closed_form_of_its_family(name):
 
 @given(a=st.floats(0.1, 1.0), ratio=st.floats(1.05, 4.0))
 def test_slider_crank_of_any_lengths_has_its_closed_form(a, ratio):
-    """The slider is at x = a cos θ + √(b² - a² sin² θ), to 1e-12 of the rod's length b, with a cos θ and a
-    sin θ of the crank's own position."""
+    """x = a cos θ + √(b² - a² sin² θ), to 1e-12 of b, with a cos θ, a sin θ of the crank's position."""
     scene = planar_slider_crank(a, a * ratio)
     motion = truth_for(scene).poses(np.linspace(0, 0.05, 9))
     crank = 2 * motion.position[:, 0]
@@ -73,8 +72,7 @@ def test_truth_does_not_depend_on_the_sign_of_an_axis(name):
     "name", ["four_bar", "spatial_slider_crank_driven", "pendulum_driven", "block_driven"]
 )
 def test_exchanged_bodies_of_joints_and_an_opposite_driver_give_an_equal_motion(name):
-    """The angle of a joint counts from its first body to the second, so that the exchange reverses its sign.
-    Poses are equal to 1e-13 m or rad."""
+    """A joint's angle counts from its first body: the sign is reversed. Poses agree to 1e-13 m or rad."""
 
     def swapped(joint):
         axes = {"axes": joint.axes[::-1]} if isinstance(joint, Universal) else {}

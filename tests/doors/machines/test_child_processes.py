@@ -81,8 +81,7 @@ def test_child_process_that_is_killed_between_two_runs_is_replaced(log: Path):
     ],
 )
 def test_processes_of_an_engine_end_with_a_parent_that_ends_or_is_killed(engine: str, way: str, log: Path):
-    """The process of the engine and its program end, after the run and during it. A parent without a signal
-    ends when its standard input is closed."""
+    """During the run and after it. A parent without a signal ends when its standard input is closed."""
     command = [sys.executable, "-c", RUN, f"{ENGINES}:{engine}"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, cwd=ROOT) as parent:
         processes = numbers_in(log)
@@ -92,9 +91,8 @@ def test_processes_of_an_engine_end_with_a_parent_that_ends_or_is_killed(engine:
 
 
 def parent_ended_by(number: signal.Signals, folder: Path) -> tuple[int, int, int]:
-    """Return the exit status of a parent that a signal ends, and the numbers of the program that it runs and
-    of the process that the program has started. The parent runs the program as `crosscheck report` runs its
-    own."""
+    """Return the exit status of a parent that a signal ends, and the numbers of its program and of the
+    process that this has started. The parent runs the program as `crosscheck report` runs its own."""
     (folder / "waiting_module.py").write_text(WAITING)
     environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{folder}"}
     command = [sys.executable, "-c", PROGRAM, "--option"]

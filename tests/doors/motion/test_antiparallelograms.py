@@ -93,8 +93,7 @@ def test_driving_a_crank_beyond_its_reach_ends_the_run_at_the_dead_position(meth
 @pytest.mark.parametrize("seed", range(4))
 def test_release_near_the_flat_position_takes_few_steps_and_loses_no_energy(seed, distance):
     """The crank starts at rest, ``distance`` (rad) from the flat pose. A run whose steps stay as short as the
-    distance takes 92 000 of them in 0.3 s; fewer than 100 are allowed. Rigid joints keep the energy, here to
-    1000 rtol."""
+    distance takes 92 000 of them in 0.3 s; fewer than 100 are allowed. The energy stays, to 1000 rtol."""
     crank, frame, _, _ = drawn(seed)
     run = simulate(four_bar(pins(crank, frame, distance)), "taylor", [0.0, 0.3], Limits(rtol=RTOL / 10))
     assert run.outcome.label == "COMPLETED" and run.cost.steps < 100, (run.message, run.cost.steps)

@@ -34,16 +34,14 @@ def test_flat_rhombus_lists_its_smooth_and_its_folding_branch():
 
 
 def test_flat_five_bar_has_one_branch_at_every_crossing():
-    """A bar keeps the coupler parallel to the ground, so that it cannot fold. In 0.05 s the
-    crank turns by 6.24 rad from π/2 and is flat at 0 and -π."""
+    """The coupler stays parallel, so it cannot fold. In 0.05 s the crank is flat at 0 and -π."""
     crossings = simulate(five_bar(), "taylor", [0.05]).crossings
     assert len(crossings) == 2 and {c.sentence for c in crossings} == {"one branch"}
 
 
 def test_folding_branch_of_a_driven_rhombus_lays_the_coupler_on_the_crank():
     """Behind the crossing the middles of crank and coupler are both at L/2 (cos θ, sin θ), L = 0.5 m, and the
-    rocker rests. Samples before the crossing do not depend on the branch that is asked for. Limits are
-    rounding."""
+    rocker rests. Samples before it do not depend on the branch, to rounding."""
     times = np.linspace(0.0, 0.06, 241)
     smooth = simulate(four_bar(), "taylor", times)
     fold = simulate(four_bar(), "taylor", times, Limits(branches={2: 2}))
@@ -83,8 +81,7 @@ def test_chain_flat_in_all_loops_lists_the_smooth_branch_and_the_fold_of_its_fir
 
 @pytest.mark.parametrize("loops", [2, 3])
 def test_second_branch_of_a_chain_folds_its_first_loop_and_keeps_the_energy(loops):
-    """In the folded loop the middles of bar and second upright coincide, to rounding. Gravity and rigid
-    joints lose no energy, to 2 rtol."""
+    """In the folded loop middles of bar and upright coincide, to rounding; the energy stays, to 2 rtol."""
     scene, times = four_bar_chain(loops), np.linspace(0.0, 1.0, 21)
     run = simulate(scene, "taylor", times, Limits(branches={1: 2}))
     assert run.outcome.label == "COMPLETED" and np.ptp(run.energy) < LOST

@@ -118,8 +118,7 @@ def test_every_method_follows_the_motion_through_its_events_as_the_judges_refere
 
 @pytest.mark.parametrize("t", [0.1, 0.2])
 def test_scene_at_a_sample_continues_the_motion_through_its_later_events(random_motion, t):
-    """A run from the sample on ends where the whole motion ends, to the tolerance of both (m). At 0.2 s some
-    constraints begin or cease to hold."""
+    """A run from the sample on has the same end, to both tolerances (m). At 0.2 s some constraints change."""
     rest = mbref.simulate(random_motion.scene_at(t), times=[0.0, 0.3 - t])
     assert np.abs(rest.position[-1] - random_motion.position[-1]).max() < 1e-9
 

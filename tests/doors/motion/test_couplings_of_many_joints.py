@@ -101,9 +101,8 @@ def test_driven_shafts_of_a_differential_turn_its_cage_by_the_mean():
 
 
 def test_offset_of_a_sum_is_met_by_the_least_displacement():
-    """Σ I φ² is least under Σ r φ = 0.03 rad, r the ratios: Lagrange's φ = 0.03 (r / I) / Σ (r² / I). The
-    start is corrected by linear steps in quaternions: angles up to 0.01 rad are right to the order φ²,
-    1e-4."""
+    """Σ I φ² is least under Σ r φ = 0.03 rad, r the ratios: Lagrange's φ = 0.03 (r / I) / Σ (r² / I). Linear
+    steps in quaternions are right to the order φ², 1e-4 for 0.01 rad."""
     scene = differential(load=[]).with_("coupling[gears].offset", "0.03 rad")
     motion = mbref.simulate(scene, times=[0.0, 1.0])
     found = np.array([motion.joint(n).angle[0] for n in "ABC"])

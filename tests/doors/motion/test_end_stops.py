@@ -174,8 +174,7 @@ BY_LIMITS = 2e-2  # m/s, kg m/s; 5e-3 of the speed, by which RK4 misses the rest
     ],
 )
 def test_two_masses_on_a_line_keep_their_momentum_and_part_by_the_restitution(name, restitution, close):
-    """2 kg at 3 m/s meet 1 kg at -1 m/s after 0.1 s. Their sum of m v is constant, and they part with e times
-    the speed at which they met, 4 m/s."""
+    """2 kg at 3 m/s and 1 kg at -1 m/s meet after 0.1 s: Σ m v stays; they part with e · 4 m/s."""
     setting = Setting("taylor", {"rtol": 1e-9}) if name == "mbref" else Setting("tuned", {"step": 5e-4})
     (event,) = engine(name).run(balls(restitution), np.array([0.0, 0.2]), setting).events
     after = event.velocity_after[:, 0]
@@ -197,8 +196,7 @@ def vibration(share: float) -> Scene:
 @pytest.mark.parametrize("share", [1e-2, 1e-4, 1e-8])
 def test_stop_just_below_the_reach_of_a_vibration_is_met(share):
     """At asin(1 - share) / 4 s, with the rate cos 4 t, of which half is left. A rounded place changes the
-    time by up to ROUNDED / rate, and the rate by this times 4 m/s², the acceleration, with a margin of
-    four."""
+    time by up to ROUNDED / rate, and the rate by this times 4 m/s², with a margin of four."""
     time, rate = np.arcsin(1 - share) / 4, np.sqrt(share * (2 - share))
     (event,) = mbref.simulate(vibration(share), "taylor", times=[0.0, 0.5], rtol=1e-13).events
     assert event.stops == ("S.upper",) and abs(event.time - time) <= ROUNDED / rate
@@ -270,8 +268,7 @@ def test_short_pull_lifts_a_mass_off_its_stop():
 
 @pytest.mark.parametrize("duration", [0.02, 0.2])
 def test_first_pull_of_a_fast_force_ends_the_contact_in_runs_of_any_length(duration):
-    """5 sin(80 π t) N exceeds the weight, 1 N, first at asin(1/5) / 80 π, about 0.8 ms. The event before, at
-    0 s, is the start of the contact."""
+    """5 sin(80 π t) N exceeds the weight, 1 N, first at asin(1/5) / 80 π; at 0 s the contact begins."""
     sine = {"polynomial": [0.0], "sine": {"amplitude": 1.0, "frequency": 80 * np.pi}}
     push = {"force": 5.0, "factor": sine}
     motion = mbref.simulate(held_by_its_weight(duration, push), times=[0.0, duration])

@@ -229,8 +229,7 @@ def test_judge_finds_latches_and_releases_by_itself(scene):
     "factor", [{"polynomial": [1.0]}, {"polynomial": [0.0, 1.0]}], ids=["constant", "ramp"]
 )
 def test_release_by_a_force_that_redundant_joints_share_is_refused_by_name(factor):
-    """Two welds hold a mass. How they share its load depends on their elasticity, which is not in the scene,
-    also for a load that begins at zero."""
+    """Two welds hold a mass. How they share its load, also one from zero, depends on their elasticity."""
     welds = [joint("B", "fixed", "ground", "a", release={"force": 1.0}), joint("C", "fixed", "ground", "a")]
     mass = body("a", 1.0, [0.1] * 3, ORIGIN)
     load = {"type": "force", "body": "a", "point": ORIGIN, "force": [0.0, -G, 0.0], "factor": factor}

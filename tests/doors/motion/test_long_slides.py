@@ -48,8 +48,7 @@ def closed_loop(length: float) -> Scene:
 @pytest.mark.parametrize("scene", [open_tree, closed_loop])
 def test_beads_on_a_turning_arm_move_out_to_548_times_their_distance_as_their_closed_form(scene, length):
     """The distance from the axis is r = r₀ cosh ωt, up to cosh 7 = 548 times r₀, at every size of the
-    mechanism: no run takes the long slide for a singular position. Relative errors are below a tenth of rtol,
-    1e-9."""
+    mechanism, none singular. Relative errors are below a tenth of rtol, 1e-9."""
     motion = mbref.simulate(scene(length), times=TIMES)
     assert motion.outcome == mbref.Outcome.COMPLETED, motion.message
     distance = np.linalg.norm(motion.position[:, 1:], axis=2)

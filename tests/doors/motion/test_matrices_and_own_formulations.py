@@ -168,8 +168,7 @@ def test_own_stabilisation_replaces_the_state_after_each_step():
     ids=["no inverse", "not a number", "leaves the constraints"],
 )
 def test_own_formulation_that_fails_ends_the_run_with_the_outcome_of_its_failure(formulation, outcome, says):
-    """The formulations invert a matrix of zeros, return NaN, and return numbers that are no accelerations of
-    the pendulum, whose joint opens."""
+    """A matrix of zeros, NaN, and numbers that are no accelerations: the pendulum's joint opens."""
     ended = mbref.simulate("point_pendulum", formulation=formulation)
     assert ended.outcome.name == outcome and says in ended.message
 

@@ -77,9 +77,8 @@ def test_formulation_without_the_claim_ends_at_the_start_with_the_number_of_redu
 
 @pytest.mark.parametrize("stabilisation", ["none", "projection"])
 def test_gram_schmidt_as_printed_has_the_judges_states_of_a_fully_driven_mechanism(stabilisation):
-    """mpi-gs-literal is the algorithm as the paper prints it. Drivers prescribe all freedoms of the
-    slider-crank. Errors of its poses against the judge's stored states are below a fifth of rtol, 1e-10
-    (``limit``)."""
+    """mpi-gs-literal is the algorithm as the paper prints it. Drivers prescribe all freedoms of the slider-
+    crank. Errors of its poses against the judge are below rtol / 5, 1e-10 (``limit``)."""
     pose, _, _ = errors("spatial_slider_crank_driven", f"mpi-gs-literal+{stabilisation}")
     assert pose < limit("mpi-gs-literal")
 
@@ -136,9 +135,8 @@ def test_baumgartes_feedback_keeps_constraint_violations_small_that_grow_without
 
 @pytest.mark.parametrize("name", ["gears with armature", "arm with universal"])
 def test_projection_keeps_joints_closed_to_rounding(name):
-    """The judge computes from the samples how far joints are open (level 0) and at which rate (level 1), in
-    lengths of the mechanism or rad. Without projection steps of 10 ms open them 1000 times as far and
-    more."""
+    """The judge computes how far joints are open (level 0) and at which rate (level 1), in lengths or rad.
+    Without projection steps of 10 ms open them 1000 times as far and more."""
     rounding = 5e-15  # 22 units of 2⁻⁵²; 4 are measured, at rates up to 2 rad/s
     closed, drifted = (errors(name, f"lm2+{s}/rk4[step=1e-2]")[2] for s in ("projection", "none"))
     for level in (0, 1):
@@ -161,8 +159,7 @@ def test_formulation_without_the_claim_reports_a_singular_matrix_and_the_body_wi
 
 
 def test_sweep_has_a_motion_for_each_pair_of_gains_with_its_own_gains():
-    """Labels name the gains. The motion with feedback of 50 /s and (50 /s)² violates the constraints less
-    than a fifth as much as the motion without."""
+    """Labels name gains. Feedback of 50 /s and (50 /s)² violates constraints less than a fifth as much."""
     gains = {"alpha": [0, 50], "beta": [0, 50]}
     runs = mbref.sweep("planar_slider_crank", "mpi-svd+baumgarte/rk4[step=1e-3]", gains, [0.05])
     violation = {label: motion.violation.position[-1] for label, motion in runs.items()}

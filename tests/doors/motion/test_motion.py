@@ -44,8 +44,7 @@ def test_displacement_of_a_guide_is_how_far_its_slider_moved(crank):
 
 
 def test_rotation_vector_of_a_universal_joint_is_the_relative_rotation(driven):
-    """Joint B is between crank and coupler. The coupler stays parallel to the ground, so that it turns by
-    +124.8 rad/s · t against the crank, modulo 2π."""
+    """B is between crank and coupler, which stays parallel: +124.8 rad/s · t, modulo 2π."""
     vector = driven.joint("B").rotation
     turned = np.arctan2(np.sin(124.8 * driven.times), np.cos(124.8 * driven.times))
     assert np.abs(vector[:, 2] - turned).max() < ROUNDING and np.abs(vector[:, :2]).max() < ROUNDING

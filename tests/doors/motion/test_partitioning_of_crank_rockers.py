@@ -46,8 +46,7 @@ def crank_rocker(lengths: tuple[float, ...], angle: float) -> Scene:
 
 
 def deviation(lengths: tuple[float, ...], angle: float, step: float) -> float:
-    """Return the distance of a completed run from the nearer branch of the linkage (m), or the drift of its
-    energy over the energy, if that is larger."""
+    """Return the distance from the nearer branch (m), or the relative drift of energy if larger."""
     scene = crank_rocker(lengths, angle)
     motion = mbref.simulate(scene, f"alf-dual+partitioning/rk4[step={step}]", np.linspace(0.0, END, 6))
     assert motion.outcome is mbref.Outcome.COMPLETED, motion.message

@@ -62,8 +62,7 @@ def test_planes_apart_move_as_in_one_plane_and_their_joints_carry_moments(name, 
 
 @pytest.mark.parametrize("about", [(np.pi / 2, 0.0, 0.0), (0.0, np.pi / 2, 0.0), (0.4, 0.2, -0.3)])
 def test_motion_turns_with_the_planes_of_a_mechanism(about):
-    """Positions and accelerations turn by the rotation vector (rad), to 100 tolerances of the run, 1e-10;
-    reactions balance every body."""
+    """Positions and accelerations turn by the vector (rad), to 1e-10; reactions balance every body."""
     scene = find_scene("strandbeest[2]")
     q = rotations.from_vector(np.array(about))
     turned = in_another_frame(scene, q, np.zeros(3))

@@ -25,8 +25,7 @@ METHODS = pytest.mark.parametrize("method", ["taylor", "alf-dual+projection/dop8
 
 
 def cam(lead: str = "angle", follow: str = "displacement", **changes) -> Scene:
-    """Two bodies on the ground, whose coordinates along hinges or slides are coupled by the law P. Only the
-    first body has a given velocity."""
+    """Two bodies on hinges or slides, coupled by the law P. Only the first has a given velocity."""
     fast = {"angular_velocity": [0.0, 0.0, SPEED]} if lead == "angle" else {"velocity": [SPEED, 0.0, 0.0]}
     parts = {"body": [], "joint": []}
     for name, kind, place, given in (("A", lead, (0, 0, 0), fast), ("B", follow, (0, 1, 0), {})):
@@ -93,8 +92,7 @@ def test_formulations_of_the_judge_agree_with_mbref_over_full_turns():
 
 
 def test_offset_starts_at_a_pose_of_the_polynomial():
-    """q₂ = 1.2 m + P(q₁) holds at the start and later. Coordinates count from the poses in the file, which do
-    not satisfy it: the start is elsewhere."""
+    """q₂ = 1.2 m + P(q₁) at the start and later; the file's poses do not satisfy it."""
     motion = mbref.simulate(cam("displacement").with_("coupling[cam].offset", 1.2), times=TIMES)
     q, value = (coordinate(motion, name)[0] for name in "AB")
     assert np.abs(q[0]) > 0.1  # m

@@ -46,8 +46,7 @@ def test_method_advised_for_a_rod_without_thickness_follows_the_pendulum(failing
 
 def test_singular_position_that_taylor_passes_is_not_called_a_dead_position():
     """The rhombus is flat at θ = -π, t = 3/2 π / (124.8 rad/s) = 37.76 ms, where branches meet and drift
-    makes rates large. Without projection the run ends there, to the time in which the crank turns by 0.1
-    rad."""
+    makes rates large. Without projection the run ends there, within 0.1 rad of the crank."""
     run = simulate("four_bar", "mpi-svd+none/dop853", np.linspace(0.0, 0.05, 11), Limits(rtol=1e-6))
     assert run.outcome.label != "COMPLETED"
     assert run.t_end == pytest.approx(1.5 * np.pi / 124.8, abs=0.1 / 124.8)

@@ -52,8 +52,7 @@ def test_samples_just_after_a_crossing_meet_the_closed_form_at_a_loose_tolerance
 @pytest.mark.parametrize("rtol", [1e-3, 1e-4, 3e-5])
 def test_torsion_spring_on_a_crossing_parallelogram_moves_as_its_closed_form(rtol):
     """The closed form is the judge's: in 3 s the bars pass five flat positions. The spring's angle continues
-    through them; high-accuracy steps there are of higher order than the steps between them. Poses are met
-    to two rtol."""
+    through them, where steps have a higher order. Poses are met to two rtol."""
     scene = four_bar_gravity().with_(load=(TorsionSpring(joint="A", stiffness=1.0),))
     run = simulate(scene, "taylor", np.linspace(0.0, 3.0, 31), Limits(rtol=rtol))
     assert relative_error(run, scene) < 2 * rtol and len(run.crossings) == 5, run.message

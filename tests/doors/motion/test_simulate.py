@@ -146,8 +146,7 @@ def test_unknown_part_of_a_method_is_refused_with_the_known_ones(name, complaint
     "name", ["lm1+none/dop853", "mpi-svd+baumgarte[alpha=10,beta=3]/rk4[step=0.0012345678]"]
 )
 def test_name_of_a_method_is_parsed_and_printed_in_full(name):
-    """Numbers keep their digits. Options without names are those of the stabilisation in their order; the
-    default integrator is added."""
+    """Numbers keep their digits; options without names are the stabilisation's; the integrator is added."""
     assert str(Method.parse(name)) == name
     assert str(Method.parse("lm1+baumgarte[10,3]")) == "lm1+baumgarte[alpha=10,beta=3]/dop853"
 

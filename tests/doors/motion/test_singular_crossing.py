@@ -69,8 +69,7 @@ def test_door_on_tilted_hinges_is_held_or_its_run_is_undecided(tilt, seed):
 @pytest.mark.parametrize("seed", [0, 1, 2])
 @pytest.mark.parametrize(("tilt", "reported"), [(1e-11, True), (1e-15, False)])
 def test_door_on_hinges_tilted_by_rounding_swings_and_a_tilt_above_rounding_is_reported(tilt, reported, seed):
-    """A door that swings falls by more than 0.1 m in 0.2 s; a held one does not move. 1e-11 rad is above the
-    rounding of the axes, 1e-15 rad is not."""
+    """A free door falls by over 0.1 m in 0.2 s. 1e-11 rad is above the rounding of the axes, 1e-15 is not."""
     scene = door(tilt, seed)
     run = simulate(scene, "taylor", [0.1, 0.2])
     assert run.outcome.label == "COMPLETED", run.message
@@ -98,8 +97,7 @@ def test_flap_on_a_door_that_tilted_hinges_hold_swings_as_on_a_welded_door(tilt)
 
 @pytest.mark.parametrize("inertia", [1e-8, 1e-6])
 def test_small_bead_on_an_arm_swings_without_a_singular_position(inertia):
-    """A pendulum is never singular, however small the bead's inertia (kg m²). It stays 1 m long, to 1e-12,
-    and keeps its energy, to ten rtol."""
+    """However small its inertia (kg m²), it stays 1 m long, to 1e-12, and keeps energy, to ten rtol."""
     bead = Body(name="bead", mass=1.0, inertia=(inertia,) * 3, position=(1.0, 0.0, 0.0))
     arm = Revolute(name="J", bodies=(GROUND, "bead"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0))
     scene = Scene(name="bead", gravity=(0.0, 0.0, -9.81), body=(bead,), joint=(arm,))

@@ -87,9 +87,8 @@ FAILURES = ("LEFT_MOTION", "NOT_CONVERGED", "STEP_FAILED")  # rounding decides w
 @pytest.mark.parametrize("method", REGULARISED)
 @pytest.mark.parametrize("loop", LOOPS)
 def test_regularised_method_meets_the_closed_form_after_the_singular_position_or_fails(loop, method):
-    """REGULARISED are methods that claim to cross by regularisation, LOOPS two parallelograms and a
-    slider-crank. A run completes within 1000 times rtol, 1e-8, or reports that it failed or left its
-    motion."""
+    """REGULARISED claim to cross by regularisation; LOOPS are two parallelograms and a slider-crank. A run
+    completes within 1000 times rtol, 1e-8, or reports that it failed or left its motion."""
     scene, end = LOOPS[loop]
     assert Method.parse(method).crosses == "by regularisation"
     run = simulate(scene, method, np.linspace(0.0, end, 21), Limits(rtol=1e-8))

@@ -20,8 +20,7 @@ ROUNDING = 1e-12  # of poses over the length
 
 
 def upright_slider_crank(rod_rate: float | None) -> Scene:
-    """Return the slider-crank of equal crank and rod, both upright: the crank turns at 30 rad/s, the rod at a
-    given rate (rad/s), or None."""
+    """Return equal crank and rod, both upright: 30 rad/s of the crank, a rate of the rod (rad/s) or None."""
     scene = slider_crank(0.308, 0.308, UPRIGHT, "upright", rate=30.0)
     crank, coupler, slider = scene.body
     if rod_rate is not None:
@@ -49,8 +48,7 @@ def test_crank_that_starts_upright_moves_its_slider_as_the_closed_form():
 
 
 def test_missing_velocities_choose_the_branch_of_the_least_kinetic_energy():
-    """Crank and rod of equal length are upright. They turn as one body, their middles on a circle of 0.154 m,
-    and the slider rests, to rtol (m)."""
+    """Equal and upright, they turn as one body on a circle of 0.154 m; the slider rests, to rtol (m)."""
     times = np.linspace(0.0, 0.5, 21)
     run = simulate(upright_slider_crank(None), "taylor", times, Limits(rtol=1e-9))
     assert run.outcome.name == "COMPLETED" and "branch with the least kinetic energy" in run.message
@@ -182,8 +180,7 @@ def ratio(crank: float, coupler: float) -> float:
 @pytest.mark.parametrize("rate", [2.0, -5.0])
 def test_spherical_loop_leaves_the_flat_position_on_the_branch_of_its_velocities(rate):
     """In the closed form tan(rocker / 2) is k tan(crank / 2) with the constant k of `ratio`, here to 100
-    rtol. The energy is constant, to 1000 rtol. The sine of the crank's half angle changes by more than
-    0.1."""
+    rtol. The energy is constant, to 1000 rtol. Its sine of half the angle changes by 0.1."""
     for crank, coupler in ((0.7, 1.1), (1.2, 0.5), (0.9, 1.3)):
         k = ratio(crank, coupler)
         scene = spherical_loop(crank, coupler, 0.0, (rate, k * rate))

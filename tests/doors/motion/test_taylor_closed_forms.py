@@ -87,8 +87,7 @@ def angle_of_bar(beside: float, duration: float) -> float:
 
 
 def sprung_bar(speed: float, place: float, natural_length: float, damping: float = 0.0) -> Scene:
-    """Return a bar that turns on a hinge at a speed (rad/s), with a spring from a place (m) on the x axis of
-    the ground to its tip."""
+    """Return a bar that turns at a speed (rad/s), with a spring from a place (m) on the x axis to its tip."""
     twist = {"velocity": (0.0, 0.2 * speed, 0.0), "angular_velocity": (0.0, 0.0, speed)}
     bar = Body(name="bar", mass=1.0, inertia=(0.001, 0.0133, 0.0133), position=(0.2, 0.0, 0.0), **twist)
     pull = spring("ground", (place, 0.0, 0.0), "bar", (0.4, 0.0, 0.0), 20.0, natural_length, damping)

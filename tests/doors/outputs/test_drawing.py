@@ -174,8 +174,7 @@ def test_animation_is_replaced_by_a_still_for_readers_who_prefer_reduced_motion(
 
 
 def test_motions_side_by_side_share_scale_and_time_and_a_shorter_one_stops(turning):
-    """Three panels, two in a row: a motion of 300 samples, its first 100 samples, and the first motion again.
-    Every third sample is a frame."""
+    """Two in a row: 300 samples, the first 100 of them, and all again. Every third is a frame."""
     scene, motion = turning
     short = dataclasses.replace(
         motion, **{name: getattr(motion, name)[:100] for name in ("times", "position", "orientation")}

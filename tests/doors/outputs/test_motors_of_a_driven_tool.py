@@ -83,8 +83,7 @@ def moved() -> mbref.Motion:
 
 
 def demand(t: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives (3, 2) of the angles at A, E and P by the tool's place, and the force (2,) that
-    the tool needs, by d'Alembert's principle."""
+    """Return derivatives (3, 2) of angles by the tool's place, and its force (2,) by d'Alembert."""
     s, c = np.sin(SPEED * t), np.cos(SPEED * t)
     p, v = np.array(TOOL) + RADIUS * np.array([s, c - 1]), RADIUS * SPEED * np.array([c, -s])
     a = -RADIUS * SPEED**2 * np.array([s, c])
@@ -204,8 +203,7 @@ def test_motors_of_a_driven_crank_are_undecided_at_singular_positions_only(name,
 @pytest.mark.parametrize("motor", "AD")
 def test_motor_near_a_folded_crank_has_its_limit_or_is_undecided(motor, times):
     """The rod is as long as the crank A, which turns by 2 π rad/s and is upright at 0.25 s. Nearby the power
-    of the driver, and so of a motor, is in proportion to the time that is left. It is met to 1e-3, or not
-    given."""
+    of driver and motor is in proportion to the time left. It is met to 1e-3, or not given."""
     driver = Driver(joint="A", polynomial=(0.0, 2 * np.pi))
     scene = mbref.find_scene("planar_slider_crank_equal").with_(gravity=DOWN, load=(), driver=[driver])
     slope = mbref.simulate(scene, times=[0.249], rtol=1e-13).driver("A").power[0] / 0.001  # W/s
@@ -217,8 +215,7 @@ def test_motor_near_a_folded_crank_has_its_limit_or_is_undecided(motor, times):
 
 
 def geared_sled() -> Scene:
-    """Return a rod on hinge A, which a wheel turns by gears with an offset of 0.6 rad, and a sled on the rod,
-    whose drive along x is named tip."""
+    """Return a rod geared to a wheel with an offset of 0.6 rad, and a sled driven along it (tip)."""
     rod, wheel, sled = (
         {"name": name, "mass": 1.0, "inertia": [0.1] * 3, "position": [x, 0.0, 0.0]}
         for name, x in (("rod", 0.5), ("wheel", 3.0), ("sled", 0.8))

@@ -61,8 +61,7 @@ def sprung() -> Motion:
 
 
 def test_length_rate_and_force_of_a_spring_follow_from_geometry(sprung):
-    """The law of cosines between the post and the tip of the rod, to rounding (ACCURACY). Force and power are
-    k (l - l₀) + c l' and -F l'."""
+    """The law of cosines, to rounding (ACCURACY); force and power are k (l - l₀) + c l' and -F l'."""
     theta, turning, _ = angle(TIMES)
     tip = 1.2 * np.stack([np.cos(theta), np.sin(theta)], axis=1)
     speed = 1.2 * turning[:, None] * np.stack([-np.sin(theta), np.cos(theta)], axis=1)

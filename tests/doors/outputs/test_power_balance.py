@@ -37,9 +37,8 @@ def off(motion: Motion) -> float:
     [*((seed, "taylor", 1e-13) for seed in GATE), *((s, m, 1e-12) for s in PLAIN[:2] for m in OTHERS)],
 )
 def test_work_of_drivers_and_loads_is_the_change_of_energy(seed, method, rtol):
-    """E(t) - E(0) = ∫ Σ P dt, by Gauss–Legendre quadrature over three panels of the run's own columns, to
-    BALANCED of the largest power. OTHERS are sparse matrices, partitioning, and Adams's method with
-    feedback."""
+    """E(t) - E(0) = ∫ Σ P dt, by Gauss–Legendre over three panels of the run's columns, to BALANCED of the
+    largest power. OTHERS are sparse matrices, partitioning, and Adams's method with feedback."""
     motion = run(powered_mechanism(seed), method, rtol)
     assert motion.outcome.name == "COMPLETED", motion.message
     assert off(motion) < BALANCED

@@ -22,8 +22,7 @@ def swung(*load) -> Motion:
 
 
 def test_springs_store_half_their_stiffness_times_the_square_of_their_stretch():
-    """The spring from (0, 3) to the tip has the length √(13 - 12 sin φ): 8 N/m (l - 1.5 m)² / 2 and 4 N m/rad
-    (φ + 20 rad)² / 2. Dampers store nothing."""
+    """l = √(13 - 12 sin φ): 8 N/m (l - 1.5 m)² / 2 and 4 N m/rad (φ + 20 rad)² / 2; dampers store none."""
     ends = {"bodies": ["ground", "arm"], "points": [[0.0, 3.0, 0.0], [2.0, 0.0, 0.0]]}
     motion = swung(
         {"type": "spring", **ends, "stiffness": 8.0, "damping": 0.3, "natural_length": 1.5},

@@ -159,9 +159,8 @@ def test_turns_of_steady_gears_are_counted_by_their_rates_where_samples_are_turn
 
 
 def test_judge_sees_a_miscounted_turn_of_few_samples_as_a_change_of_energy():
-    """The energy of the spring, 12 (φ - 40)² / 2, depends on the turns. With the run's own turns it is
-    constant to 1e-9 (CLOSE); one turn more changes it by more than 0.001; without turns it is unknown
-    (None)."""
+    """The spring's energy, 12 (φ - 40)² / 2, with the run's own turns is constant to 1e-9 (CLOSE); one turn
+    more changes it by more than 0.001; without turns it is unknown (None)."""
     few = mbref.simulate(wound_wheel(), times=[0.7, END])
     assert energy_series(few.mechanism, few).max() < CLOSE
     assert energy_series(few.mechanism, replace(few, angles=None)) is None

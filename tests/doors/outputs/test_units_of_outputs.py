@@ -123,8 +123,7 @@ def test_columns_of_one_unit_share_a_panel_on_request(motion, together, labels):
 
 
 def test_several_motions_are_drawn_into_given_axes(motion):
-    """Curves that are there stay, and a label stands behind the name of a column. The motion of 30 rpm turns
-    half as far as the one of 60 rpm."""
+    """Curves that are there stay, a label follows a column's name; 30 rpm turns half as far as 60 rpm."""
     slow = mbref.simulate(crank(rate=math.pi), times=TIMES)
     ax = Figure().subplots()
     ax.plot([0, 1], [0, 1], label="by hand")

@@ -28,9 +28,8 @@ def test_built_in_scenes_have_the_counts_that_the_paper_states(name):
 
 @pytest.mark.parametrize("loops", [1, 2, 5, 200])
 def test_chains_have_the_counts_of_their_formulas(loops):
-    """N four-bars: N + 1 hinges of 5 rows below and 2 N universal joints of 4 rows above, N rows redundant.
-    N slider-cranks: 18 rows each and N - 1 welds of 6 rows; 1 row of each and 5 of each weld are
-    redundant."""
+    """N four-bars: N + 1 hinges of 5 rows below and 2 N universal joints of 4 rows above, N rows redundant. N
+    slider-cranks: 18 rows each and N - 1 welds of 6 rows; 1 of each and 5 of a weld are redundant."""
     for name, stated in (
         ("four_bar_chain", (12 * loops + 6, 13 * loops + 5, loops, 1)),
         ("slider_crank_chain", (18 * loops, 24 * loops - 6, 6 * loops - 5, 1)),

@@ -38,8 +38,7 @@ def test_frequency_on_a_spring_far_shorter_than_the_mechanism_is_that_of_its_sti
 
 
 def test_scene_of_an_equilibrium_counts_angles_from_its_pose_and_is_its_own_equilibrium():
-    """The arm of 0.7 m rests at 0.4 rad, where its spring is relaxed, to rounding (POSE). The scene returned
-    has the arm there and the natural angle 0."""
+    """The arm of 0.7 m rests at 0.4 rad, its spring relaxed (POSE), with the natural angle 0."""
     [each] = equilibria(damped_spring(), starts=1)
     place = ARM * np.array([np.cos(0.4), np.sin(0.4), 0.0])
     assert np.allclose(each.scene.body[0].position, place, atol=POSE)
@@ -79,8 +78,7 @@ def test_vibration_keeps_the_constraints_and_returns_after_its_period():
 
 
 def test_command_equilibrium_prints_stability_and_reactions_and_writes_the_pose(tmp_path, capsys):
-    """The pendulum rests below and above its hinge, which carries m g = 19.62 N. The file has one of both
-    poses, to rounding (POSE)."""
+    """It rests below and above its hinge, which carries m g = 19.62 N. The file has one pose (POSE)."""
     path, rest = (str(tmp_path / name) for name in ("my.toml", "rest.toml"))
     pendulum().save(path)
     assert main(["equilibrium", path, "--starts", "6", "--out", rest]) == 0

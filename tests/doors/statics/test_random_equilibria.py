@@ -56,8 +56,7 @@ def judged(scene: Scene, starts: int) -> list[Judged]:
 
 @pytest.mark.parametrize("seed", [0, 3])
 def test_eigenvalues_agree_with_the_judges_within_their_bounds(seed):
-    """The judge's eigenvalues are those of its own linearised equations at the pose that is found, where its
-    own accelerations vanish."""
+    """The judge's are of its own linearised equations, where its own accelerations vanish."""
     (found,) = judged(at_rest(random_mechanism(seed)), starts=1)
     assert found.acceleration < BALANCED and found.eigenvalues <= 1
 
