@@ -77,9 +77,9 @@ def test_torque_of_a_driver_is_the_reduced_inertia_times_the_acceleration(scene,
 @pytest.mark.slow  # 1.5 CPU s; power of all loads and drivers in test_laws_of_mechanics.py
 @pytest.mark.parametrize("seed", range(20))
 def test_change_of_the_energy_is_the_drivers_work_less_the_dampers_losses(seed: int) -> None:
-    """E(t) - E(0) = ∫ (P - Σ c v²) dt. The spline through 401 samples of the power is exact to 1e-10 of the
+    """E(t) - E(0) = ∫ (P - Σ c v²) dt. The spline through 801 samples of the power is exact to 1e-10 of the
     largest energy; the limit has a margin of ten. The spring's force is k (l - 0.5 m) + c l'."""
-    scene, times = machine(seed), np.linspace(0.0, 1.0, 401)
+    scene, times = machine(seed), np.linspace(0.0, 1.0, 801)
     table = crosscheck.reference_table(scene, times)
     guide, bar = scene.load
     lost = guide.damping * table["B.displacement_rate"] ** 2 + bar.damping * table["load(1).length_rate"] ** 2
