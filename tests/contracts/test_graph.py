@@ -170,15 +170,6 @@ def hinged(*pairs: tuple[str, str]) -> Scene:
     return Scene(name="hinged", body=bodies, joint=joints)
 
 
-def test_a_four_bar_is_cut_at_its_last_joint_or_at_its_last_joint_between_links():
-    """Joints 0 to 3 lead from the ground over links a, b and c to the ground; 2 is between b and c."""
-    four_bar = hinged(("ground", "a"), ("a", "b"), ("b", "c"), ("c", "ground"))
-    [at_ground] = spanning_tree(four_bar, ("revolute",)).closures
-    assert at_ground.joint == 3 and GROUND_LINK in at_ground.links
-    [between] = spanning_tree(four_bar, ("revolute",), between_links=True).closures
-    assert between.joint == 2 and between.kind == "revolute"
-
-
 def test_a_body_with_two_hinges_to_the_ground_is_split_if_the_ground_is_never_cut():
     """Hinges 0 and 1 join body a to the ground: a loop that is nowhere between links. Its cut is a weld of
     two halves of a, 0.5 kg each. The other loops are cut at hinges 2 and 4, between a and b."""

@@ -6,12 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-import mbref
 from crosscheck.judge import constraints
-from crosscheck.judge.mobility import mobility
 from mbref import rotations
 from mbref.scene import (
-    GROUND,
     Body,
     Cylindrical,
     Distance,
@@ -21,7 +18,6 @@ from mbref.scene import (
     SceneError,
 )
 from mbref.scenes import SCENES
-from tests.helpers.coupled_mechanisms import coupled_loops, gear_pair, pendulum, screw
 from tests.helpers.truth_scenes import CLOSED
 
 AXIS = (0.3, -0.5, 0.8)
@@ -164,25 +160,3 @@ def test_initial_velocity_off_a_hinge_is_rounded_up_to_five_percent_and_refused_
     assert constraints.initial_twists(rounded)[0][0] == pytest.approx([0.0, 3.0, 0.0])
     with pytest.raises(SceneError, match=r"joint\[0\] 'A': the given velocities contradict it: off by 0.18"):
         constraints.initial_twists(refused)
-
-
-@pytest.mark.parametrize("make", [gear_pair, screw, pendulum, coupled_loops])
-def test_coupling_is_a_constraint_row_and_an_armature_is_none(make):
-    """The judge's rows, redundant rows and freedoms are mbref's, except for rows of rotors: in mbref each
-    armature is a hidden body with six coordinates and as many rows."""
-    made = make()
-    counts, found = mbref.counts(made), mobility(made)
-    rotors = sum(bool(joint.armature) for joint in made.joint if hasattr(joint, "armature"))
-    assert found.degrees_of_freedom == counts.degrees_of_freedom and found.redundant == counts.redundant
-    assert found.rows == counts.rows - 6 * rotors
-
-
-def test_mobility_of_four_small_scenes_is_as_counted_by_hand():
-    """(rows, redundant rows, freedoms): a free body; a pendulum, by five rows; a boom that a rope holds; a
-    hinge and its copy, whose five rows are redundant."""
-    free = scene(body("b", 1.0, 0.0, 0.0))
-    rope = Distance(name="rope", bodies=(GROUND, "b"), anchors=(Z, X))
-    assert mobility(free) == (0, 0, 6)
-    assert mobility(free.with_(joint=[hinge(axis=Y)])) == (5, 0, 1)
-    assert mobility(free.with_(joint=[hinge(axis=Y), rope])) == (6, 0, 0)
-    assert mobility(free.with_(joint=[hinge("A"), hinge("B")])) == (10, 5, 1)

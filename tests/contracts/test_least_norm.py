@@ -48,12 +48,6 @@ def test_singular_value_counts_only_above_the_tolerance(least):
     assert difference(matrix, matrix @ np.random.default_rng(0).normal(size=9)) < 100 * 1e-11
 
 
-def test_contradicting_equations_have_the_least_squares_solution():
-    """Each equation is there with two right-hand sides; NumPy's pseudo-inverse takes their mean."""
-    matrix = np.vstack([unit_rows(1, 4, 6, [1.0] * 4)] * 2)
-    assert difference(matrix, np.random.default_rng(1).normal(size=8)) < ROUNDING
-
-
 @pytest.mark.parametrize("shape", [(0, 4), (3, 0), (3, 4)])
 def test_zero_or_empty_matrix_has_the_solution_zero_and_a_full_null_space(shape):
     """Without equations (0 rows) or unknowns (0 columns), or with the coefficients zero."""

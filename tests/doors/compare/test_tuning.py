@@ -1,6 +1,5 @@
 """Search for the cheapest setting: models of runs with known cost and error / the setting by hand."""
 
-from argparse import ArgumentTypeError
 from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any, NamedTuple
@@ -209,17 +208,3 @@ def test_cheapest_step_by_closure_gap_counts_distances_and_no_angles():
 def test_length_option_takes_a_unit_and_means_metres_without(text, metres):
     """1 in = 25.4 mm."""
     assert length(text) == pytest.approx(metres, rel=1e-15)  # four roundings
-
-
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        *((text, "must be positive") for text in ("0mm", "-1 mm")),
-        ("3 parsec", "'parsec' is no unit of length"),
-        *((text, "must be a number") for text in ("wide", "")),
-    ],
-)
-def test_length_option_refuses_what_is_no_positive_length(text, says):
-    """``length`` reads the lengths of command lines: zero, negative numbers, unknown units and words."""
-    with pytest.raises(ArgumentTypeError, match=says):
-        length(text)

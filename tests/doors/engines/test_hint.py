@@ -98,12 +98,6 @@ def test_hint_for_an_engine_with_right_accelerations_points_at_its_integration(m
     assert "accelerations agree with the judge's, so look at the integration" in found
 
 
-def test_a_conforming_engine_has_no_hint(monkeypatch):
-    """The example engine without a defect ("") passes all checks on a free fall."""
-    conforming = held_against(runner_with("", monkeypatch), [KNOWN["free_fall"]])
-    assert conforming.conforms and conforming.hint == ""
-
-
 def test_result_of_verify_on_a_failing_engine_has_the_hint(monkeypatch):
     """The engine without gravity fails on a free fall; the hint is in the result and in its record."""
     failing = held_against(runner_with("gravity", monkeypatch), [KNOWN["free_fall"]])

@@ -197,14 +197,6 @@ def test_first_questions_to_an_engine_wait_for_each_other(monkeypatch: pytest.Mo
     assert log.read_text().split() == ["begin", "end"] * 2, log.read_text()
 
 
-def test_engines_do_not_share_a_process(tmp_path: Path):
-    """RECORDER and SLOW log the process of their runs; both runs of RECORDER are in the first process."""
-    log, plain = tmp_path / "log", Setting("a")
-    for fake in ("RECORDER", "SLOW", "RECORDER"):
-        run_isolated(f"{FAKES}:{fake}", still(str(log)), TIMES, plain, 60.0)
-    assert numbered(log) == [0, 1, 0]
-
-
 REAL = {  # settings of two families each
     "mbref": (Setting("alf-dual+projection", {"rtol": 1e-6}), Setting("mpi-svd+none", {"rtol": 1e-6})),
     "mujoco": (Setting("stock", {"step": 1e-3}), Setting("defaults", {"step": 1e-3})),

@@ -69,21 +69,6 @@ def test_implicitfast_is_offered_only_for_scenes_with_damping() -> None:
     assert "implicitfast" in {s.family for s in ENGINE.settings(every_joint())}
 
 
-@pytest.mark.parametrize(
-    ("name", "duration", "beta", "measured"),  # s, gain (1/s), measured error (m, rad)
-    [
-        ("planar_slider_crank", 0.2, 2000.0, 6.1e-11),
-        ("spatial_slider_crank", 0.02, 8000.0, 5.9e-13),
-        ("spatial_slider_crank_driven", 0.2, 1200.0, 7.5e-14),
-    ],
-)
-def test_integrated_accelerations_of_mujoco_stay_within_their_measured_error(name, duration, beta, measured):
-    """DOP853 integrates MuJoCo's accelerations ("forward"); errors are at most ten times the measured."""
-    scene = SCENES[name]()
-    run = simulate(scene, duration, "forward", rtol=1e-10, min_step=2e-5, beta=beta, hard=1e-7)
-    assert completed_error(run, scene) < MARGIN * measured
-
-
 def test_hardened_closures_are_closer_to_the_truth_than_stock_and_defaults() -> None:
     """On the spatial slider-crank at a step of 1e-5 s. By default closures return within 20 ms, in "stock"
     within two steps, and in "tuned" they hardly open. Errors from the judge's truth fall by a factor of over

@@ -265,12 +265,6 @@ def test_gate_names_the_field_that_differs_and_twice_the_difference_has_twice_th
     assert twice.by == pytest.approx(2 * once.by, rel=1e-6)  # rounding of a small difference
 
 
-def test_gate_states_a_difference_of_positions_in_lengths_of_the_mechanism():
-    """0.1 mm of the double hinge's length, √(0.9² + 0.3² + 0.2²) m."""
-    found = by_gate(double_hinge, "initial position", 1)
-    assert found.by == pytest.approx(1e-4 / LENGTHS[double_hinge], rel=1e-6)  # rounding
-
-
 @pytest.mark.parametrize("change", ["mass", "inertia"])
 def test_gate_names_the_change_of_velocity_of_a_body_with_another_mass_or_inertia(change):
     """The second block has a tenth more of it; the difference is more than ten times what the gate allows."""

@@ -139,10 +139,3 @@ def test_two_quantities_for_given_axes_or_three_columns_as_abscissa_are_refused(
         motion.plot("A.angle", "A.rate", ax=Figure().subplots())
     with pytest.raises(mbref.InputError, match="over: must be one column"):
         motion.plot("A.angle", over="mass.position")
-
-
-def test_data_frame_has_the_requested_columns_in_units(motion):
-    """The mass on the crank is at x = 250 cos 2π t mm."""
-    frame = motion.to_dataframe("mass.position.x", units="mm")
-    assert list(frame.columns) == ["mass.position.x [mm]"] and frame.index.name == "time [s]"
-    assert np.allclose(frame["mass.position.x [mm]"], 250 * np.cos(RATE * TIMES), atol=1e-9)  # mm

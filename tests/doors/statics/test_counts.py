@@ -48,12 +48,6 @@ def test_ground_as_frame_saves_six_coordinates_and_rows(name):
     assert (frame.redundant, frame.degrees_of_freedom) == (body.redundant, body.degrees_of_freedom)
 
 
-def test_rank_of_the_four_bar_is_one_less_at_its_straight_pose():
-    """Of 19 rows one is redundant at any pose, and a second one where all links are in line."""
-    assert mbref.counts(SCENES["four_bar"]()).rank == 18
-    assert mbref.counts(SCENES["four_bar_straight"]()).rank == 17
-
-
 def test_diagnosis_counts_the_rows_that_share_a_redundant_force():
     """One row is redundant: a force along z on the line through the slider's pin can act in all joints. At C
     and D, on this line, it is one component; at the hinges A and B, off the line, it is a force and a moment.
