@@ -112,12 +112,6 @@ def test_an_engine_that_refuses_every_scene_is_not_shown_to_conform(capsys):
     assert main(["verify", f"{FAKES}:REFUSING", "--mechanisms", "1"]) == 1
 
 
-def test_verify_reports_the_signal_that_ended_an_engine(capsys):
-    """The engine SEGFAULT ends its process by SIGSEGV in each run."""
-    assert main(["verify", f"{FAKES}:SEGFAULT", "--scene", "free_fall"]) == 1
-    assert "SIGSEGV" in capsys.readouterr().out
-
-
 def test_verify_refuses_an_unknown_scene_with_status_two(capsys):
     assert main(["verify", "mbref", "--scene", "nothing"]) == 2
     assert "unknown scene of the suite 'nothing'" in capsys.readouterr().err

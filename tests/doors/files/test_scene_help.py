@@ -12,7 +12,7 @@ from crosscheck.conformance.changes.units import in_other_units
 from mbref.cli import main
 from mbref.cli.output import Lines
 from mbref.cli.scene_files import schema, template
-from mbref.scene import Driver, Revolute, Scene, SceneError
+from mbref.scene import Revolute, Scene, SceneError
 from mbref.scene.slips import probable_slips
 from mbref.scenes import SCENES, find_scene
 
@@ -315,15 +315,6 @@ def pinned_four_bar() -> Scene:
     fields = {"type": "revolute", "axis": (0.0, 0.0, 1.0)}
     pins = [{"name": j.name, "bodies": j.bodies, "anchor": j.anchor_pair[0], **fields} for j in scene.joint]
     return scene.with_(joint=pins)
-
-
-def test_diagnose_reports_more_drivers_than_degrees_of_freedom(tmp_path, capsys):
-    """Drivers at the hinges A and D of a four-bar, which has one degree of freedom."""
-    drivers = [Driver(joint=name, polynomial=(0.0, 1.0)) for name in "AD"]
-    pinned_four_bar().with_(driver=drivers).save(tmp_path / "driven.toml")
-    assert main(["diagnose", str(tmp_path / "driven.toml")]) == 0
-    last = capsys.readouterr().out.splitlines()[-1]
-    assert last == "  more drivers than degrees of freedom (2 and 1): redundant rows remain"
 
 
 RUN = ["run", "planar_slider_crank", "--duration", "0.01", "--samples", "3"]

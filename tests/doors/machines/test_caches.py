@@ -86,6 +86,16 @@ def test_damaged_file_is_reported_removed_and_not_read(damage, tmp_path: Path, c
     assert not path.exists()
 
 
+def test_unwritable_folder_is_reported_once(tmp_path: Path, capsys):
+    """A file is in the folder's place, and two files cannot be written into it."""
+    (tmp_path / "file").write_text("no folder")
+    for name in "ab":
+        checked_file.write(tmp_path / "file" / name, b"data")
+        assert checked_file.read(tmp_path / "file" / name) is None
+    error = capsys.readouterr().err
+    assert error.count("cannot write to") == 1, error
+
+
 def test_folder_in_place_of_a_file_is_reported(tmp_path: Path, capsys):
     (tmp_path / "a").mkdir()
     assert checked_file.read(tmp_path / "a") is None
