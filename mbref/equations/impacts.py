@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mbref.equations.initial_state import consistent_start, position_weights
-from mbref.equations.joint_reactions import least_reactions, open_dimensions
+from mbref.equations.joint_reactions import least_reactions, open_dimensions, vanishing_at
 from mbref.equations.model import Model
 from mbref.equations.units import row_lengths
 from mbref.scene import Driver, Scene, SceneError
@@ -51,8 +51,9 @@ def impact(before: Scene, after: Scene) -> Impact:
     _refuse_contradiction(model, terms.jacobian, terms.nu - terms.jacobian @ w, np.append(v, w))
     motion = model.motion(poses, w.reshape(1, model.nb, 6), np.zeros((1, model.nb, 6)))
     blocks, energy = terms.blocks[None], (float(v @ (model.mass * v)) / 2, float(w @ (model.mass * w)) / 2)
-    wrenches = least_reactions(model, poses, blocks, multipliers[None])
-    marks = open_dimensions(model, blocks)
+    redundant = vanishing_at(model, 0.0, q)
+    wrenches = least_reactions(model, poses, blocks, multipliers[None], always=redundant)
+    marks = open_dimensions(model, blocks, redundant)
     model.release()
     return Impact(
         motion["velocity"][0],

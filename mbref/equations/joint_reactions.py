@@ -67,32 +67,37 @@ def least_reactions(
     blocks: np.ndarray,
     multipliers: np.ndarray,
     angles: np.ndarray | None = None,
+    always: int | None = None,
 ) -> dict[str, np.ndarray]:
-    """Return ``reactions`` of least norm, if redundant rows leave a choice and are few."""
-    if model.m <= MOST_OPEN_ROWS and model.once(_redundant_at_start):
-        multipliers = _of_least_norm(model, blocks, multipliers)
+    """Return ``reactions`` of least norm, if redundant rows leave a choice and are few.
+
+    ``always`` combinations of rows vanish at every pose; by default they are counted at the scene's start.
+    """
+    if model.m <= MOST_OPEN_ROWS:
+        always = model.once(_redundant_at_start) if always is None else always
+        multipliers = _of_least_norm(model, blocks, multipliers, always) if always else multipliers
     return reactions(model, q, blocks, multipliers, angles)
 
 
 def _redundant_at_start(model: Model) -> int:
     """Return the number of combinations of rows that vanish at the scene's pose, and also near it: at a
     singular position more of them vanish than elsewhere."""
-    found = _vanishing(model, 0.0, model.start())
-    return min(found, _vanishing(model, *perturbed_state(model, consistent_start(model)))) if found else 0
+    found = vanishing_at(model, 0.0, model.start())
+    return min(found, vanishing_at(model, *perturbed_state(model, consistent_start(model)))) if found else 0
 
 
-def _vanishing(model: Model, t: float, q: np.ndarray) -> int:
+def vanishing_at(model: Model, t: float, q: np.ndarray) -> int:
     """Return the number of combinations of rows that vanish at coordinates q (7 nb,)."""
     return vanishing_combinations(model, model.terms(t, q).blocks[None]).along.shape[-1]
 
 
-def _always_redundant(model: Model, vanishing: VanishingCombinations) -> int:
-    """Return the number of combinations of rows that vanish at every sample, and at the scene's pose."""
+def _at_every_sample(vanishing: VanishingCombinations, always: int) -> int:
+    """Return the number of combinations of rows that vanish at every sample, at most ``always``."""
     found = np.any(vanishing.along != 0.0, axis=1).sum(axis=1)
-    return min(model.once(_redundant_at_start), int(found.min(initial=model.m)))
+    return int(found.min(initial=always))
 
 
-def _of_least_norm(model: Model, blocks: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+def _of_least_norm(model: Model, blocks: np.ndarray, multipliers: np.ndarray, always: int) -> np.ndarray:
     """Return λ (k, m) without the part along combinations of rows that vanish at every pose.
 
     A run computes this part with a penalty, which magnifies rounding. The norm is of rows of unit length in
@@ -100,7 +105,7 @@ def _of_least_norm(model: Model, blocks: np.ndarray, multipliers: np.ndarray) ->
     the reactions may be large.
     """
     vanishing = vanishing_combinations(model, blocks)
-    first = vanishing.along.shape[-1] - _always_redundant(model, vanishing)
+    first = vanishing.along.shape[-1] - _at_every_sample(vanishing, always)
     units = row_lengths(model.structure.dense(blocks) * model.data.metric_root)
     along = (units / vanishing.lengths)[..., None] * vanishing.along[..., first:]
     part = along @ (np.linalg.pinv(along, rcond=OPEN) @ (units * multipliers)[..., None])
@@ -192,17 +197,18 @@ def _bend(model: Model, q: np.ndarray, p: int, angles: np.ndarray | None) -> np.
     return np.asarray(law.deriv()(value))
 
 
-def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray]:
+def open_dimensions(model: Model, blocks: np.ndarray, always: int | None = None) -> dict[str, np.ndarray]:
     """Return for each joint the number (k,) of reaction components that equilibrium does not determine at
     each sample, and for ``driver(A)`` 1 where it does not determine the force or torque of the driver.
 
     Redundant rows leave reactions undetermined at all times, a singular position only when the motion passes
     it. At a singular position a linear combination of rows vanishes, a left null vector of Φ_q (Wojtyra, J.
     Theor. Appl. Mech. 43, 2005). There, no finite reactions may balance the forces, and no driver's force is
-    determined. The argument ``blocks`` (k, m, 12) contains Φ_q.
+    determined. The argument ``blocks`` (k, m, 12) contains Φ_q, and ``always`` is as for ``least_reactions``.
     """
     combinations = vanishing_combinations(model, blocks)
-    vanishing, always = combinations.along, _always_redundant(model, combinations)
+    vanishing = combinations.along
+    always = _at_every_sample(combinations, model.once(_redundant_at_start) if always is None else always)
     is_singular = (combinations.values < UNBALANCED).sum(axis=1) > always
     rows = dict.fromkeys((joint.name for joint in model.scene.joint), slice(0))  # joints without rows
     held = tuple(name for name in rows if name in model.structure.row_joint)
