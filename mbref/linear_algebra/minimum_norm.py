@@ -92,35 +92,43 @@ def go_on_by_conjugate_directions(factor, alpha, target, multipliers):
     Physics 34, 1955). Returns OK if only rounding, or rows dependent to DEPENDENT_ROW, remain; otherwise
     NOT_CONVERGED.
     """
-    residual, step, change, direction = factor.residual, factor.step, factor.change, factor.direction
-    direction[:], before = 0.0, 1.0
+    factor.direction[:], before = 0.0, 1.0
     for _ in range(ITERATIONS):
-        subtract_product(factor, change, residual)
-        copy(residual, step)
-        solve(factor, step)
-        along = product(residual, step)
-        if along <= alpha * (LAST_CHANGE * norm_of(target, factor)) ** 2:
+        before = step_along_conjugate_direction(before, norm_of(target, factor), alpha, factor)
+        if before == 0.0:
             return OK
-        for i in range(step.shape[0]):
-            direction[i] = step[i] + along / before * direction[i]
-        times_transpose(factor, direction, change)
-        square, before = product(change, change), along
-        if along * alpha * DEPENDENT_ROW**2 >= square:
-            return OK
-        go_along(along / square, factor, target, multipliers)
+        write_multipliers(factor.symbolic.row, factor.total, multipliers)
+        add_scaled(factor, target)
     return NOT_CONVERGED
 
 
-@inlined
-def go_along(length, factor, target, multipliers):
-    """Change ``target`` and ``multipliers`` by a length times the direction."""
-    row, change, total = factor.symbolic.row, factor.change, factor.total
-    for i in range(row.shape[0]):
-        total[i] -= length * factor.direction[i]
-    write_multipliers(row, total, multipliers)
+@kernel
+def step_along_conjugate_direction(before, size, alpha, factor):
+    """Subtract D times ``change`` from the residual, and take the next conjugate direction: its step is added
+    to ``total``, with the opposite sign, and Dᵀ times the step is the new ``change``.
+
+    Return the product of residual and preconditioned residual, which is ``before`` of the next step; 0 if
+    only rounding of a solution of this ``size``, or rows dependent to DEPENDENT_ROW, remain.
+    """
+    residual, step, change, direction = factor.residual, factor.step, factor.change, factor.direction
+    subtract_product(factor, change, residual)
+    copy(residual, step)
+    solve(factor, step)
+    along = product(residual, step)
+    if along <= alpha * (LAST_CHANGE * size) ** 2:
+        return 0.0
+    for i in range(step.shape[0]):
+        direction[i] = step[i] + along / before * direction[i]
+    times_transpose(factor, direction, change)
+    square = product(change, change)
+    if along * alpha * DEPENDENT_ROW**2 >= square:
+        return 0.0
+    length = along / square
+    for i in range(step.shape[0]):
+        factor.total[i] -= length * direction[i]
     for j in range(change.shape[0]):
         change[j] *= length
-    add_scaled(factor, target)
+    return along
 
 
 @kernel
@@ -196,7 +204,7 @@ def find_least_multipliers(factor, force, multipliers):
     for j in range(column.shape[0]):
         x[j] = factor.root[j] * force[column[j]] * factor.share[j]
     total[:] = 0.0
-    before, change, size, scale = inf, 0.0, 0.0, product(x, x)
+    before, change, size, scale = inf, 0.0, 0.0, sqrt(product(x, x))
     for _ in range(ITERATIONS):
         factor.residual[:] = 0.0
         subtract_product(factor, x, factor.residual)
@@ -212,39 +220,19 @@ def find_least_multipliers(factor, force, multipliers):
             break
         before = change
     if change > UNFINISHED * UNFINISHED * size:  # near a singular position
-        factor.residual[:] = 0.0
-        subtract_product(factor, x, factor.residual)
         balance_along_conjugate_directions(factor, scale)
     write_multipliers(row, total, multipliers)
 
 
 @kernel
 def balance_along_conjugate_directions(factor, scale):
-    """Add to the multipliers in ``total`` those that the remaining forces x need, with -D x in ``residual``:
-    conjugate gradients for S λ = D x with S + I/α as preconditioner. ``scale`` is the square of the norm of
-    all forces.
-
-    Combinations of rows that are dependent to DEPENDENT_ROW take no part.
-    """
-    residual, step, change, direction = factor.residual, factor.step, factor.change, factor.direction
-    direction[:], before = 0.0, 1.0
+    """Add the multipliers that the remaining forces x in ``change`` need to those in ``total``: conjugate
+    gradients for S λ = D x with S + I/α as preconditioner. ``scale`` is the norm of all forces."""
+    factor.residual[:], factor.direction[:], before = 0.0, 0.0, 1.0
     for _ in range(ITERATIONS):
-        copy(residual, step)
-        solve(factor, step)
-        along = product(residual, step)
-        if along <= ALPHA * LAST_CHANGE * LAST_CHANGE * scale:
+        before = step_along_conjugate_direction(before, scale, ALPHA, factor)
+        if before == 0.0:
             break
-        for i in range(step.shape[0]):
-            direction[i] = step[i] + along / before * direction[i]
-        times_transpose(factor, direction, change)
-        square, before = product(change, change), along
-        if along * ALPHA * DEPENDENT_ROW**2 >= square:
-            break
-        for i in range(step.shape[0]):
-            factor.total[i] -= along / square * direction[i]
-        for j in range(change.shape[0]):
-            change[j] *= along / square
-        subtract_product(factor, change, residual)
 
 
 @entry(INT(VECTOR, VECTOR, FACTOR))
