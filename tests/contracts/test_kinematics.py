@@ -51,7 +51,7 @@ def test_initial_velocities_satisfy_joints_and_drivers(name):
 
 @pytest.mark.parametrize("name", [n for n in CLOSED if SCENES[n]().body[0].angular_velocity is not None])
 def test_initial_velocities_keep_given_angular_velocities(name):
-    """They change by less than 1e-13 of the largest, or of 1 rad/s: rounding."""
+    """Given angular velocities change by less than 1e-13 of the largest, or of 1 rad/s: rounding."""
     bodies = SCENES[name]().body
     _, spin = constraints.initial_twists(SCENES[name]())
     given = {k: each.angular_velocity for k, each in enumerate(bodies) if each.angular_velocity}
@@ -145,7 +145,7 @@ POSE = constraints.initial_poses(PARTS)
 
 
 def test_joint_rates_are_spin_about_and_velocity_along_the_axis():
-    """b spins at 3 rad/s about z, A's axis; c at 1 rad/s about x, C's axis, along which it has 2 m/s."""
+    """b spins at 3 rad/s about z, A's axis; c at 1 rad/s about x, C's axis, along which it moves at 2 m/s."""
     rates = constraints.joint_rates(PARTS, *POSE, np.array([O, (2.0, 5.0, 0.0)]), np.array([(0, 0, 3.0), X]))
     assert rates["A"] == pytest.approx([3.0, 0.0]) and rates["C"] == pytest.approx([1.0, 2.0])
 

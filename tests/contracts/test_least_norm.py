@@ -50,7 +50,7 @@ def test_singular_value_counts_only_above_the_tolerance(least):
 
 @pytest.mark.parametrize("shape", [(0, 4), (3, 0), (3, 4)])
 def test_zero_or_empty_matrix_has_the_solution_zero_and_a_full_null_space(shape):
-    """Without equations (0 rows) or unknowns (0 columns), or with the coefficients zero."""
+    """The matrix has no equations (0 rows), no unknowns (0 columns), or zeros alone."""
     x, basis = least_norm_and_null_space(np.zeros(shape), np.zeros(shape[0]), TOLERANCE)
     assert not x.any() and basis.shape == (shape[1], shape[1])
 
@@ -64,7 +64,7 @@ def test_tolerance_is_relative_to_the_largest_singular_value():
 
 @pytest.mark.parametrize("seed", range(5))
 def test_basis_of_a_null_space_depends_on_the_space_alone(seed):
-    """Combined equations in another order have the basis of the first ones; it is orthonormal."""
+    """Six combinations of four equations have the null space of the four, and the same orthonormal basis."""
     random = np.random.default_rng(seed)
     matrix = random.normal(size=(4, 9))
     basis = null_space(matrix, TOLERANCE)

@@ -103,7 +103,7 @@ def test_site_draws_a_figure_of_every_type_of_load():
 
 
 def test_page_of_robustness_names_only_existing_tests():
-    """It names more than 30 tests as proofs of its rows."""
+    """The page names more than 30 tests as proofs of its rows."""
     sources = "".join(path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
     named = set(re.findall(r"`(test_\w+)`", (DOCS / "robustness.md").read_text()))
     assert len(named) > 30

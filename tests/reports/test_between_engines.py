@@ -124,7 +124,7 @@ def test_both_branches_of_the_rhombus_move_side_by_side(parted):
 
 
 def test_branch_that_ended_early_says_so_and_stands_still(parted):
-    """STEP_FAILED after 40 samples: frames of all samples of branch 1, equal from the 40th on."""
+    """Branch 1 ended (STEP_FAILED) with 40 samples. It has a frame a sample, equal from the 40th on."""
     count, (first, second) = 40, sorted(parted.branches, key=lambda r: r["asked"]["options"]["branches"])
     bodies = {n: {k: v[:count] for k, v in body.items()} for n, body in second["bodies"].items()}
     times = second["times"][:count]

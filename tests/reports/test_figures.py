@@ -31,7 +31,7 @@ def pixels(png: bytes) -> int:
     "name", [f"spatial_slider_crank-{k}" for k in ("mechanism", "speed", "violation", "energy")]
 )
 def test_figure_is_not_blank_and_reproducible(name):
-    """Drawn twice it is one SVG. Blank ones have less than 10 paths, and 60 different rows of pixels."""
+    """Drawn twice a figure is one SVG. A blank one has at most 10 paths and 60 different rows of pixels."""
     picture = pictures()[name]
     once, again = figures.svg(picture.draw(), name), figures.svg(picture.draw(), name)
     assert once == again, f"{name} changes from one drawing to the next"

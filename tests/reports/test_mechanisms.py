@@ -19,7 +19,7 @@ from tests.reports.synthetic import exact, motion, record, scene, truths
 
 
 def test_exact_run_is_drawn_on_the_exact_motion():
-    """Equal frames, one a sample. The crank keeps its length to 0.3 px; ends are rounded to 0.1 px."""
+    """Frames of both are equal, one a sample. The crank keeps its length to 0.3 px, as ends are rounded."""
     crank = scene("planar_slider_crank")
     true = exact(crank)
     picture = mechanisms.over_truth(crank, true, true, "mujoco")

@@ -118,7 +118,7 @@ def test_convergence_table_shows_the_orders_put_into_the_records():
 
 
 def test_limit_table_shows_the_bias_and_discretisation_put_in():
-    """a: 1e-4 + 1e-2 h, of which 1e-5 at h = 1e-3. b: 1e-2 h², without bias, rounding below 1e-12."""
+    """Errors of a are 1e-4 + 1e-2 h: 1e-5 by h = 1e-3; of b 1e-2 h², with a bias of rounding, below 1e-12."""
     soft = [record("a", "soft", 1e-4 + 1e-2 * h, 0.1, step=h) for h in (0.04, 0.02, 0.001)]
     true = [record("b", "true", 1e-2 * h**2, 0.1, step=h) for h in (0.04, 0.02, 0.01)]
     [group] = by_scene([*soft, *true], {scene().name: scene()})
@@ -161,7 +161,7 @@ def test_summary_says_if_engines_move_different_mechanisms(shifts, words):
 
 
 def test_model_check_that_timed_out_is_no_difference():
-    """One short motion is the truth: a timed-out one is no difference, one 1e-4 m off is one."""
+    """One short motion is the truth: one that timed out is no difference, one that is 1e-4 m off is."""
     late = {**nothing("c", "x"), "outcome": "TIMED_OUT"}
     found = [
         by_scene(records()[:3], {scene().name: scene()}, [at_gate(0.0), other])[0].difference()

@@ -26,7 +26,7 @@ def folder(tmp_path):
 
 
 def test_records_stored_without_motions_give_the_same_cheapest_runs(folder):
-    """Within 1e-6 on the planar slider-crank: with and without the samples (``bodies``)."""
+    """Costs on the planar slider-crank agree to 1e-6 with and without samples (``bodies``) of the records."""
     (stored,) = groups(folder)
     whole = next(group for group in groups(REPORTS / "reference") if group.scene.name == stored.scene.name)
     assert "bodies" not in stored.runs[0].record and len(stored.runs) == len(whole.runs)

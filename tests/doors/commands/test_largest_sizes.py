@@ -106,7 +106,7 @@ LARGEST_FILE = 2**25  # bytes, 32 MB, of a factorisation in the cache
 
 
 def test_factorisation_of_480_rows_on_one_coordinate_leaves_no_file_above_32_mb_in_the_cache():
-    """Its lists of indices, of 4 bytes each, take more than the largest file. The factorisation of 3 rows
+    """The factorisation's lists of indices, of 4 bytes each, take more than the largest file. One of 3 rows
     leaves a file, so that the cache is not empty. A file has a checksum of less than 1 % more."""
     for count in (3, 480):
         row, column = np.arange(count), np.zeros(count, dtype=int)

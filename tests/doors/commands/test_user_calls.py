@@ -70,6 +70,6 @@ def test_motion_is_saved_as_json_only(saved, tmp_path):
     ],
 )
 def test_times_of_simulate_that_are_no_samples_are_refused(times, says):
-    """No time, lists of lists, times that fall, negative and missing ones, texts, a huge number."""
+    """Refused are no time, lists of lists, falling, negative and missing times, texts, and a huge number."""
     with pytest.raises(InputError, match=f"^times: {says}$"):
         mbref.simulate("four_bar", times=times)

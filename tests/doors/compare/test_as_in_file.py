@@ -243,7 +243,7 @@ def test_hold_refuses_a_body_that_hangs_on_another_body(tmp_path):
 
 
 def test_a_body_falls_freely_only_without_joints_and_spin_and_with_gravity():
-    """Else a joint holds it, a spin adds Euler's equations, or nothing falls without gravity."""
+    """Otherwise a joint holds the body, a spin adds Euler's equations, or nothing makes the body fall."""
     top = SCENES["heavy_top"]()
     still = top.with_(joint=()).with_("body[0].angular_velocity", (0.0, 0.0, 0.0))
     assert falls_freely(still) and not falls_freely(still.with_(joint=top.joint))

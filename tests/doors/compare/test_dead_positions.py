@@ -34,13 +34,13 @@ def test_reference_ends_at_the_dead_position_of_a_driven_slider_crank(scene, tim
 
 @pytest.mark.parametrize("name", MADE)
 def test_motion_that_ends_before_its_dead_position_has_none(name):
-    """It ends at 0.95 of the closed form's time."""
+    """The motion ends at 0.95 of the closed form's time."""
     scene, time = MADE[name]
     assert end_of(scene, 0.95 * time) is None
 
 
 def test_singular_positions_of_a_driven_four_bar_are_no_dead_positions():
-    """Its crank is driven at 124.8 rad/s by 1.05 turns, over two singular positions that the mechanism
+    """The crank is driven at 124.8 rad/s by 1.05 turns, over two singular positions that the mechanism
     passes: links of equal lengths are flat at each half turn."""
     turn = 2 * np.pi / 124.8
     assert end_of(SCENES["four_bar"](), 1.05 * turn) is None
@@ -49,7 +49,7 @@ def test_singular_positions_of_a_driven_four_bar_are_no_dead_positions():
 @pytest.mark.slow  # each a reference of 2 CPU s; references end at dead positions in the tests below
 @pytest.mark.parametrize("name", ["turned", "pushed"])
 def test_comparison_with_even_samples_is_shortened_to_end_just_before_the_dead_position(name):
-    """It keeps 41 even samples. "Just before" means within the last 5 % of the closed form's time."""
+    """The comparison keeps 41 even samples. "Just before" is the last 5 % of the closed form's time."""
     scene, time = MADE[name]
     shorter = followed(scene, np.linspace(0.0, scene.duration, 41), SECONDS)
     assert shorter.dead == pytest.approx(time, rel=ACCURACY)

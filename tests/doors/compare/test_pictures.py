@@ -48,7 +48,7 @@ def test_stored_runs_along_branches_are_not_made_again(run, tmp_path):
 
 
 def test_worst_run_is_shown_by_its_poses_alone(run):
-    """The run of largest error, at the truth's times, without rates; a crashed run has no poses."""
+    """The run of largest error is drawn at the truth's times, without rates; a crashed run has no poses."""
     case, record = run
     worse = {**record, "metrics": {**record["metrics"], "error": 1.0}}
     coarse = case._replace(setting=Setting("taylor", {"rtol": 1e-3}))
@@ -68,7 +68,7 @@ def test_shown_numbers_have_six_digits_of_the_largest():
 
 
 def test_crossings_with_several_branches_are_shown_before_others():
-    """Up to two, by number from 1: first those with several branches; else the first crossing alone."""
+    """Crossings are numbered from 1. Shown are at most two with several branches, or else the first one."""
     alone, several = {"velocity": [1]}, {"velocity": [1, 2]}
     assert shown([alone, several, several, several]) == [2, 3]
     assert shown([alone, alone]) == [1]

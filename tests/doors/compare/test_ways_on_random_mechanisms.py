@@ -58,7 +58,7 @@ def test_every_tenth_mechanism_is_large(number, fewest, most):
 
 
 def test_each_difference_above_a_limit_in_the_stored_records_has_a_cause():
-    """A file lists causes by engine and ways: the stored records need exactly these; findings exist."""
+    """A file lists causes by engine and ways: records need exactly these, and the named findings exist."""
     shown = {each.cause for each in above(engines(read()))}
     assert shown == set(causes())
     assert {cause.finding for cause in causes()} - {""} <= {finding.name for finding in findings()}

@@ -100,7 +100,7 @@ def test_mbref_is_right_and_engines_without_derivatives_are_refused_with_the_own
 
 
 def test_stored_results_are_those_of_the_page_and_can_be_of_another_file(tmp_path, capsys):
-    """The command without arguments shows the records from which the page is made."""
+    """Without --records the command shows the records that the page is made from."""
     assert main(["derivatives", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert {row["scene"] for row in found["rows"]} == {mechanism.name for mechanism in MECHANISMS}

@@ -55,7 +55,7 @@ def test_eigenvalue_of_a_pendulum_depends_on_its_numbers_as_in_closed_form():
 
 
 def test_eigenvalues_of_two_carts_depend_on_masses_and_springs_as_in_closed_form():
-    """m₁ m₂ s⁴ + ((k + c) m₂ + c m₁) s² + k c = 0 is differentiated by a complex step."""
+    """Their equation, m₁ m₂ s⁴ + ((k + c) m₂ + c m₁) s² + k c = 0, is differentiated by a complex step."""
     scene = carts([2.0, 3.0], [("ground", "c0", 50.0), ("c0", "c1", 20.0)])
 
     def rates(m1, m2, k, c):

@@ -197,8 +197,9 @@ def test_result_does_not_depend_on_units_nor_on_the_order_of_numbers():
         assert found.numbers[name] == pytest.approx(1e-3 * by_own.numbers[name], rel=1e-9)
 
 
-def test_least_torque_moves_the_mass_as_near_below_or_above_the_pivot_as_bounds_allow():
-    """The mean square of m g (x cos φ - y sin φ) is (m g)² (x² + y²)/2: y is 0 and x its lower bound."""
+def test_least_torque_moves_the_mass_to_the_height_of_the_pivot_and_its_lower_bound():
+    """A mass at (x, y) from the pivot needs the torque m g (x cos φ - y sin φ), of mean square (m g)² (x² +
+    y²) / 2 over a turn: the least has y = 0 and x at its lower bound, 0.1 m."""
     times = np.linspace(0.0, 1.0, 17)[:-1]
     found = mbref.synthesise(
         arm(0.5, 0.2), ARM, least=["driver(A).torque"], bounds={ARM[0]: (0.1, 1.0)}, times=times, starts=1

@@ -185,7 +185,7 @@ def test_equilibrium_of_a_pendulum_with_a_torsion_spring_moves_as_in_closed_form
 
 
 def test_driven_linkage_that_accelerates_from_rest_is_not_in_equilibrium():
-    """Its driver turns the crank by t² rad: velocities are zero at the start, and accelerations are not."""
+    """The driver turns the crank by t² rad: velocities are zero at the start, and accelerations are not."""
     scene = crank_linkage(ROCKER).with_(driver=[{"joint": "A", "polynomial": [0.0, 0.0, 1.0]}])
     with pytest.raises(mbref.InputError, match="is not in equilibrium"):
         mbref.equilibrium_sensitivities(scene, ["B.force"], ["body[last].mass"])

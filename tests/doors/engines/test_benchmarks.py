@@ -44,7 +44,7 @@ def test_equation_derived_by_hand_gives_the_true_motion(name: str):
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ["DOP853", "Radau"])
 def test_scipys_integrators_reach_the_true_motion_at_a_fine_tolerance(family: str):
-    """Errors, of the length or rad, are above 1e-4 at 1e-5, and below 1e-7 at 1e-9."""
+    """Errors, of the length or rad, exceed 1e-4 at a tolerance of 1e-5, and are below 1e-7 at 1e-9."""
     from general_integrators import SCIPY
 
     coarse, fine = (

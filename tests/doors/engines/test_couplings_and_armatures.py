@@ -208,7 +208,7 @@ def test_find_scenes_assembles_offsets_and_read_scenes_does_not(tmp_path):
 
 
 def test_mjcf_keeps_the_offset_of_a_coupling(tmp_path):
-    """A rack is written and read again: alike to 1e-12 m; without the offset of 3 mm over 2 mm away."""
+    """A rack written and read again moves alike, to 1e-12 m; without its offset of 3 mm over 2 mm away."""
     pytest.importorskip("mujoco")
     scene, path = shifted(rack, "teeth", 0.003), tmp_path / "rack.xml"
     formats.write(scene, path)

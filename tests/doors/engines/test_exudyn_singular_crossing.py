@@ -31,7 +31,7 @@ def test_exudyns_samples_at_and_next_to_a_singular_position_are_true():
 
 
 def test_exudyns_runs_through_a_singular_position_repeat_to_the_bit():
-    """In mechanism 27 Newton's iteration stalls at 0.0494 s, and extrapolation goes on: three equal runs."""
+    """Newton's iteration stalls at 0.0494 s of mechanism 27; extrapolation goes on. Three runs are equal."""
     scene = mechanism(27)
     times = np.linspace(0, scene.duration, 9)
     setting = [setting for setting in ENGINE.settings(scene) if setting.family == "tuned"][-1]

@@ -77,7 +77,7 @@ def test_solvers_that_need_a_constraint_do_not_serve_a_free_body():
 @pytest.mark.slow
 @pytest.mark.parametrize(("family", "measured"), ERRORS.items())
 def test_newton_s_solver_moves_a_four_bar_within_its_measured_error(family, measured):
-    """Errors over 0.2 s at steps of 1 ms, over the length; 1.5 times the measured one is allowed."""
+    """Errors in 0.2 s with steps of 1 ms, over the length, are at most 1.5 times the measured ones."""
     assert 0 < error_of_four_bar(family) < MARGIN * measured
 
 
@@ -163,8 +163,8 @@ def chain() -> Scene:
     [("lox", pushed), ("semi-implicit", pushed), ("padmm, moreau", chain), ("mujoco", chain)],
 )
 def test_first_step_of_newton_has_the_reference_s_accelerations(family, make):
-    """The change of velocities over 1 ms / 1 ms, within 2 % of the reference's largest acceleration; a load
-    of opposite sign, in another frame or unit would change more."""
+    """The change of velocities in a step of 1 ms, over 1 ms, is within 2 % of the reference's largest
+    acceleration. A load of opposite sign, in another frame or unit would change it by more."""
     scene, h = make(), 1e-3
     run = engine("newton").run(scene, np.array([0.0, h]), setting(family, h))
     exact = natural_motion(scene, [0.0], EXTENDED)

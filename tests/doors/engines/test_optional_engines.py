@@ -24,7 +24,7 @@ def nothing_more(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_optional_engines_without_their_packages_are_not_run_by_default(nothing_more: None) -> None:
-    """They stay known by name; without a name the built-in ones run, and no notice names the others."""
+    """Optional engines stay known by name. Unasked, the built-in ones run, and no notice names the others."""
     assert set(OPTIONAL) <= set(engine_names()), f"known: {engine_names()}"
     assert not any(map(installed, OPTIONAL)), f"installed: {[n for n in OPTIONAL if installed(n)]}"
     assert default_engines()[: len(BUILT_IN)] == BUILT_IN and not set(OPTIONAL) & set(default_engines())

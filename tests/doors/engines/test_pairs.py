@@ -116,7 +116,7 @@ BESIDE = {
 @pytest.mark.parametrize("name", ENGINES)
 @pytest.mark.parametrize("parts", BESIDE.values(), ids=BESIDE)
 def test_engine_moves_a_mechanism_with_drivers_and_joints_side_by_side(name, parts):
-    """Off Gauss's principle by less than LIKE_TRUTH, 1e-5 of the length or rad; refusals are skipped."""
+    """Poses are off Gauss's principle by less than LIKE_TRUTH, 1e-5 of the length or rad; refusals skip."""
     assert error(name, scene(**parts)) < LIKE_TRUTH
 
 
@@ -135,7 +135,7 @@ REFUSED = {"bullet": set(), "mjx": DRIVEN, "warp": DRIVEN, "newton": DRIVEN | OF
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STEPPERS)
 def test_engines_with_own_steps_move_every_pair(name):
-    """All pairs are in one scene. Error / effect of the weaker part is below 0.1; a lost part leaves 1."""
+    """All pairs are in one scene. Errors are below a tenth of the effect of losing a part of the pair."""
     if not installed(name):
         pytest.skip(f"{name} is not installed")
     pairs = {

@@ -156,7 +156,7 @@ def test_swash_plate_lifts_a_pin_as_its_closed_form(name: str, bodies: tuple[str
 
 
 def test_ondsel_s_accelerations_of_a_plane_between_moving_bodies_are_left_out() -> None:
-    """OndselSolver computes wrong ones there. Those of a slider-crank on a plane of the ground are given."""
+    """OndselSolver computes wrong accelerations there. On a plane of the ground a slider-crank has them."""
     scene, _ = swash_plate(("plate", "pin"))
     grounded = guided()[1]
     driven = grounded.with_(body=at_rest(grounded), driver=(Driver(joint="A", polynomial=(0.0, 30.0)),))
@@ -176,7 +176,7 @@ def referred(scene: Scene) -> Reference:
 @pytest.mark.parametrize("joints", [1, 2])
 @pytest.mark.parametrize("bodies", ORDERS, ids="-".join)
 def test_reference_of_a_block_on_an_incline_is_the_closed_form(bodies: tuple[str, str], joints: int) -> None:
-    """Within the stated bound, at most 1e-12; a second joint closes a loop of formulation B's tree."""
+    """To the stated bound, at most 1e-12, also where a second joint closes a loop of formulation B's tree."""
     found, (position, orientation) = referred(incline(bodies, joints)), exact_poses()
     allowed = found.bound.max()
     assert np.abs(found.position[:, 0] - position).max() <= allowed
@@ -186,7 +186,7 @@ def test_reference_of_a_block_on_an_incline_is_the_closed_form(bodies: tuple[str
 
 @pytest.mark.parametrize("bodies", [("plate", "pin"), ("pin", "plate")], ids="-".join)
 def test_reference_of_a_swash_plate_is_the_closed_form(bodies: tuple[str, str]) -> None:
-    """z = 0.2 m + 0.3 · 0.5 m · (1 - cos 3 t), within the stated bound, at most 1e-12."""
+    """The pin is at z = 0.2 m + 0.3 · 0.5 m · (1 - cos 3 t), within the stated bound, at most 1e-12."""
     scene, heights = swash_plate(bodies)
     found = referred(scene)
     assert np.abs(found.position[:, 1, 2] - heights).max() <= found.bound.max()

@@ -98,7 +98,7 @@ def test_variants_of_a_place_or_ratio_together_equal_single_runs(scene, path):
 
 
 def test_variants_with_and_without_crossings_together_equal_single_runs():
-    """Up to 400 m/s² along the guide stop some cranks before crank and rod are in line."""
+    """Gravity of up to 400 m/s² along the guide stops some cranks before crank and rod are in line."""
     scenes = list(variants(SCENES["planar_slider_crank_equal"](), [Variation("gravity[0]", -400, 400)], 10))
     runs, differing = compared(scenes, np.linspace(0.0, 0.1, 5), method="taylor")
     assert not differing
@@ -121,7 +121,7 @@ def test_variants_that_all_cross_singular_positions_are_computed_in_one_batch():
 
 
 def test_variants_that_fail_or_complete_together_equal_single_runs():
-    """The most steps allowed are the median of single runs' steps, so that some variants fail."""
+    """The limit of steps is the median of the single runs' steps, so that some variants fail."""
     scenes = list(variants(CRANK, [MASS, LENGTH], 12))
     steps = [simulate(scene, METHOD, TIMES, LIMITS).cost.steps for scene in scenes]
     runs, differing = compared(scenes, limits=Limits(rtol=1e-6, most_steps=int(np.median(steps))))
@@ -150,7 +150,8 @@ def test_scenes_of_one_shape_with_different_independent_rows_together_equal_sing
 
 
 def test_variants_of_springs_and_full_inertias_together_equal_single_runs():
-    """Six variants with principal moments of inertia are one batch, six with products another."""
+    """The rod's inertia has principal moments in six variants, and products in six. Of six with principal
+    moments one runs alone first, and five in its batch."""
     points = ((0.3, 0.2, 0.0), CRANK.body[1].position)
     spring = Spring(bodies=("ground", "rod"), points=points, stiffness=50.0, natural_length=0.1)
     sprung = CRANK.with_(load=(*CRANK.load, spring))

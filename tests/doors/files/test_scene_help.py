@@ -139,7 +139,7 @@ def turning(rate: float | str) -> list[dict]:
     ],
 )
 def test_probable_slip_is_one_sentence(path, value, slip):
-    """Gravity in mm/s², inertia in kg mm², an anchor in mm, no joints, a driver beyond 100 rad in 1 s."""
+    """Slips are mm in gravity, inertia and an anchor, no joints, and a turn of more than 100 rad in 1 s."""
     scene = find_scene("planar_slider_crank").with_(duration=1.0, load=())
     [found] = probable_slips(scene.with_(path, value))
     assert found.startswith(slip)
@@ -187,7 +187,7 @@ def with_hinges(*axes, height: float = 0.0) -> Scene:
     ],
 )
 def test_only_a_single_hinge_axis_in_the_plane_of_a_planar_mechanism_is_a_probable_slip(scene, slips):
-    """Hinges A and B are normal to the plane. Further hinges T0, T1, … lie in it or not, see the ids."""
+    """Hinges A and B are normal to the plane; the ids say whether further hinges T0, T1, … lie in it."""
     slip = "joint[T0].axis: lies in the plane of the mechanism; other axes are across it"
     assert probable_slips(scene) == [slip] * slips
 
@@ -217,7 +217,7 @@ def test_orientation_in_degrees_is_refused_with_the_formula_of_the_quaternion():
 
 @pytest.mark.parametrize("text", ["wide", "3 parsec", "30 deg", "1e999 mm", "1 2 mm"])
 def test_text_that_is_no_length_is_refused_in_a_sentence(text, snapshot):
-    """Snapshots: no number, an unknown unit, a unit of angle, a number too large, and two numbers."""
+    """A word, and numbers with an unknown unit, a unit of angle, too large a value, or a second number."""
     with pytest.raises(SceneError) as caught:
         find_scene("four_bar").with_("joint[A].anchor", [text, 0.0, 0.0])
     assert caught.value.faults == snapshot
@@ -364,7 +364,7 @@ def test_command_animate_names_the_option_that_shows_several_branches(tmp_path, 
     ],
 )
 def test_command_animate_states_why_there_are_no_branches(words, says, tmp_path, capsys, monkeypatch):
-    """One branch at each position, no or too few positions, or a method that detects none."""
+    """Each position has one branch, there are none or too few, or the method detects none."""
     monkeypatch.chdir(tmp_path)
     assert main(["animate", *words.split(), "--branches"]) == 2
     assert says in capsys.readouterr().err and not list(tmp_path.iterdir())

@@ -24,7 +24,8 @@ def finger(version: str) -> str:
 @pytest.mark.parametrize(("version", "axis"), [("1.4", (0, 1, 0)), ("1.10", (0, 0, 1))])
 @pytest.mark.parametrize("uri", ["model://finger", "finger", "file://finger/old.sdf"])
 def test_included_model_has_the_axes_of_its_own_version(uri, version, axis, tmp_path):
-    """Before SDF 1.5 the axis is the model's y, then the link's, turned to z. The include names and poses."""
+    """The finger's axis is y, in the model's frame before SDF 1.5, later in its link's, whose y is the
+    world's z. The include gives name and pose."""
     (tmp_path / "finger").mkdir()
     (tmp_path / "finger" / "old.sdf").write_text(finger(version))
     config = '<model><sdf version="1.2">older.sdf</sdf><sdf version="1.4">old.sdf</sdf></model>'

@@ -76,7 +76,7 @@ def test_an_axis_is_in_the_frame_of_the_model_by_the_rule_of_its_version(files, 
     ],
 )
 def test_a_screw_moves_by_its_pitch_a_turn(files, more, metres_a_turn):
-    """libsdformat: thread_pitch p is -2π / p m a turn, screw_thread_pitch prevails, the default is 1 m."""
+    """libsdformat: thread_pitch p moves by -2π / p m a turn, screw_thread_pitch prevails; 1 m by default."""
     scene, _ = files.scene(sdf(link("nut"), joint("s", "screw", "world", "nut", more=more)), "screw.sdf")
     motion = mbref.simulate(scene.with_(gravity=(0.0, 0.0, -9.81)), times=[0.0, 0.3])
     turned, moved = motion.joint("s").angle[-1], motion["nut"].position[-1][2]

@@ -67,7 +67,7 @@ def test_reference_passes_the_singular_position_of_an_uneven_five_bar():
 
 
 def test_computation_of_a_certified_table_ends_at_its_limit_of_cpu_time():
-    """It raises NotCertified with the reason OVER, within the CPU time ALLOWED, 4 s."""
+    """The computation raises NotCertified with the reason OVER, within the CPU time ALLOWED, 4 s."""
     pytest.importorskip("flint")
     scene = SCENES["andrews_squeezer"]()
 

@@ -114,7 +114,7 @@ def test_a_missing_spring_that_is_slack_at_the_start_is_found_along_the_run():
 
 @pytest.mark.parametrize(("part", "passes"), [(0.009, True), (0.011, False)])
 def test_accelerations_along_a_run_may_be_off_by_one_percent(part, passes):
-    """Exact accelerations of a pendulum are made 0.9 or 1.1 % too large; a run without any passes."""
+    """A pendulum's accelerations 0.9 % too large pass, 1.1 % do not; a run without accelerations passes."""
     scene = arm()
     run = gauss_motion(scene, (0.0, 0.1))
     names = ("acceleration", "angular_acceleration")

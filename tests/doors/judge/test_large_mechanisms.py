@@ -59,7 +59,7 @@ def test_large_mechanisms_differ_in_parts_loops_and_redundant_rows_and_ranks_of_
 
 
 def test_reduction_drops_bodies_and_keeps_the_loops_that_a_violation_needs():
-    """The violation is made up: each mechanism of three loops or more has it. Three bodies suffice."""
+    """The made-up violation occurs in mechanisms of three loops or more, for which three bodies suffice."""
     small = fewer_bodies(large_graph(11), lambda scene: loops(scene) >= 3)
     assert len(small.body) <= 3 and loops(small) >= 3
 

@@ -121,7 +121,7 @@ def test_run_of_a_body_that_the_scene_lacks_is_refused():
 
 @pytest.mark.parametrize("order", [0.75, 1, 2, 4, 8])
 def test_order_of_convergence_is_the_power_put_in_above_a_floor(order):
-    """3 h^p with 10 % scatter, which moves the order by less than 0.1, and a floor of 1e-13."""
+    """Errors are 3 h^p, with 10 % scatter that moves the order by less than 0.1, and a floor of 1e-13."""
     steps = 0.5 / 2.0 ** np.arange(12)
     scatter = 1 + 0.1 * np.sin(7 * np.arange(12))
     errors = np.maximum(3 * steps**order * scatter, 1e-13)
@@ -150,7 +150,7 @@ COSTS, ERRORS = [1.0, 10.0, 100.0, 50.0], [1e-2, 1e-4, 1e-6, 1e-3]  # error = 1e
     ids=["between two runs", "above the cheapest run's error", "below all errors"],
 )
 def test_cost_at_an_error_is_read_on_the_lower_envelope_of_the_runs(level, cost):
-    """error = 1e-2 / cost² between runs; a worse run has no effect; the cheapest costs 1; 1e-7 is not met."""
+    """Errors are 1e-2 / cost² on the envelope, from cost 1 on; a worse run has no effect; none has 1e-7."""
     assert cost_at_error(COSTS, ERRORS, level) == pytest.approx(cost)
 
 

@@ -131,7 +131,7 @@ def wound_disc() -> Scene:
 
 @pytest.mark.parametrize("times", [(1.0, 2.0, 5.0, 8.0), (8.0,), tuple(np.linspace(0.0, 8.0, 30))])
 def test_angles_of_a_reference_count_full_turns_whatever_samples_are_asked_for(times) -> None:
-    """φ = 10 sin t rad, torque -φ, energy 10² / 2 = 50 J, to 1e-10 rad and ten times that."""
+    """The angle is 10 sin t rad, the spring's torque its negative, to 1e-10; the energy 50 J, to 1e-9."""
     table, angle = crosscheck.reference_table(wound_disc(), times), 10 * np.sin(times)
     assert table["A.angle"] == pytest.approx(angle, abs=1e-10)
     assert table["load(0).torque"] == pytest.approx(-angle, abs=1e-10)
@@ -146,7 +146,7 @@ def torque_of_a(length: float, driven_joints: str) -> float:
 
 
 def test_driver_torque_of_a_closed_loop_grows_with_the_square_of_its_size():
-    """N m = kg m²/s²: with units of length 1e6 times smaller it is 1e12 times larger, to 1e-9."""
+    """N m is kg m²/s²: in a unit of length 1e6 times smaller the torque's number is 1e12 times larger."""
     assert torque_of_a(1e6, "A") == pytest.approx(1e12 * torque_of_a(1.0, "A"), rel=1e-9)
 
 

@@ -92,7 +92,7 @@ def test_relative_measure_is_the_largest_over_all_observed_numbers():
 
 
 def test_end_measure_is_the_largest_relative_error_of_the_last_sample():
-    """At the end x is off by 0.25 of 1 m, y by 2 of 4 m, or x by 1.75 of -1 m; earlier ones don't count."""
+    """At the end x is off by 0.25 of 1 m, y by 2 of 4 m, or x by 1.75 of -1 m; only the end counts."""
     run = moved(2, 0, (-0.25, 0.0, 0.0))
     run.position[2, 1, 1] += 2.0
     run.position[1] += 100.0

@@ -217,7 +217,7 @@ def test_angle_of_millions_of_turns_is_right_within_its_rounding(duration):
 
 
 def test_reference_command_writes_a_table_that_judge_finds_right(tmp_path, capsys):
-    """Status 0; with another order of quaternions status 1, and the explanation names this order."""
+    """The status is 0. With another order of quaternions it is 1, and the explanation names this order."""
     SCENE.save(tmp_path / "s.toml")
     scene, out = str(tmp_path / "s.toml"), str(tmp_path / "ref.csv")
     assert main(["reference", scene, "--out", out, "--samples", "81"]) == 0

@@ -86,8 +86,8 @@ def test_bound_of_a_mechanism_far_from_the_origin_holds_the_rounding_of_its_samp
     ],
 )
 def test_reference_is_within_its_bound_of_a_known_motion(name):
-    """The error is the difference from the closed form. The bound is at most 1e-12 of the length or rad, or
-    4e-10, ten times the largest measured, over singular positions (SINGULAR)."""
+    """The error is the difference from the closed form. The bound is at most 1e-12 of the length or rad; over
+    singular positions (SINGULAR) 4e-10, ten times the largest measured."""
     scene = ALL[name]
     found, reason = samples(scene, BRIEF.get(name, scene.duration))
     truth = closed_form(scene)

@@ -72,7 +72,7 @@ def test_truth_does_not_depend_on_the_sign_of_an_axis(name):
     "name", ["four_bar", "spatial_slider_crank_driven", "pendulum_driven", "block_driven"]
 )
 def test_exchanged_bodies_of_joints_and_an_opposite_driver_give_an_equal_motion(name):
-    """A joint's angle counts from its first body: the sign is reversed. Poses agree to 1e-13 m or rad."""
+    """Angles count from the first body: the driver's sign is reversed. Poses agree to 1e-13 m or rad."""
 
     def swapped(joint):
         axes = {"axes": joint.axes[::-1]} if isinstance(joint, Universal) else {}

@@ -143,7 +143,8 @@ def largest_energy(scene: Scene, run: Trajectory) -> float:
 
 @pytest.mark.parametrize("share", [1e-6, 0.03])
 def test_velocities_too_fast_by_a_share_have_that_error_and_kinetic_energies_that_drift(share):
-    """Joints allow (1 + s) v. T is too large by ((1 + s)² - 1) T, relative to the largest energy."""
+    """Velocities (1 + s) v obey the joints. The kinetic energy T is too large by ((1 + s)² - 1) T, relative
+    to the largest energy."""
     scene, _, exact = exact_of(double_hinge)
     faster = {name: (1 + share) * getattr(exact, name) for name in ("velocity", "angular_velocity")}
     found = measured(double_hinge, **faster)
@@ -156,7 +157,7 @@ def test_velocities_too_fast_by_a_share_have_that_error_and_kinetic_energies_tha
 
 
 def test_violation_of_a_joint_is_the_gap_that_is_put_in_at_every_level():
-    """Three rows of a hinge are components of its gap or a rate of it: one is at least 1/√3 of it."""
+    """Three rows of a hinge are components of its gap or of its rates: the largest is at least 1/√3 of it."""
     _, _, exact = exact_of(double_hinge)
     for level, factor in (("position", 1), ("velocity", 10), ("acceleration", 100)):
         moved = changed(getattr(exact, level), 3, 1, factor * SHIFT)
@@ -313,7 +314,8 @@ def test_noise_of_positions_is_measured_within_a_factor_of_six(size):
 @pytest.mark.parametrize(("scale", "units"), [(scene_length, 7.0), (acceleration_scale, 7.0 / 0.5**2)])
 @pytest.mark.parametrize("name", MOTIONS)
 def test_scale_of_a_scene_is_in_its_units_and_independent_of_frame_and_order(name, scale, units):
-    """The mechanism's length and its scale of accelerations; units of length, time are 7, 0.5 times."""
+    """Scales are the mechanism's length, and an acceleration. Numbers of lengths are 7 times as large in
+    other units, those of times half as large."""
     scene = MOTIONS[name]()
     turn, shift = rotations.from_vector(0.9 * AXIS), 20 * SHIFT
     others = in_another_frame(scene, turn, shift), in_another_order(scene)

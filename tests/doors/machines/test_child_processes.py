@@ -81,7 +81,7 @@ def test_child_process_that_is_killed_between_two_runs_is_replaced(log: Path):
     ],
 )
 def test_processes_of_an_engine_end_with_a_parent_that_ends_or_is_killed(engine: str, way: str, log: Path):
-    """During the run and after it. A parent without a signal ends when its standard input is closed."""
+    """The parent ends in the engine's run or after it, by a signal, or as its standard input is closed."""
     command = [sys.executable, "-c", RUN, f"{ENGINES}:{engine}"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, cwd=ROOT) as parent:
         processes = numbers_in(log)

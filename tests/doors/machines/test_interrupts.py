@@ -19,7 +19,7 @@ def _python_handler() -> Iterator[None]:
 
 
 def test_interrupt_lost_during_a_compilation_is_raised_at_its_end():
-    """A function that LLVM calls loses the exception, as ``except`` does here. The handler is back."""
+    """LLVM's callbacks lose the exception, as ``except`` does here. Python's handler is back at the end."""
     done = []
     with pytest.raises(KeyboardInterrupt), interrupts_kept():
         try:

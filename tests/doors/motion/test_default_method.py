@@ -32,7 +32,7 @@ def test_default_method_is_sparse_matrices_for_large_mechanisms_of_small_loops_a
 
 
 def test_mechanism_with_a_massless_link_or_a_driver_moves_by_taylor_by_default():
-    """Otherwise alf-dual, which solves no massless links, and ends at dead positions of drivers."""
+    """The other default, alf-dual, solves no massless links and ends at dead positions of drivers."""
     scene = find_scene("strandbeest[6]")
     assert default_method(scene).startswith("alf-dual")
     link = scene.body[1].model_copy(update={"mass": 0.0, "inertia": (0.0, 0.0, 0.0)})

@@ -276,7 +276,7 @@ def test_first_pull_of_a_fast_force_ends_the_contact_in_runs_of_any_length(durat
 
 
 def test_rod_that_starts_at_the_end_of_its_range_leaves_it_without_an_event():
-    """Its upper end is its start, and it falls from there to -1 rad with I ω² / 2 = m g l sin 1, where I =
+    """The rod starts at its upper end and falls from there to -1 rad with I ω² / 2 = m g l sin 1, where I =
     0.7 kg m², m = 2 kg and l = 0.5 m. With e = 0.5 it rebounds with ω / 2."""
     stop = {"lower": -1.0, "upper": 0.0, "restitution": 0.5}
     joint = hinge("A", "ground", "rod", ORIGIN, Z, stop=stop)

@@ -100,7 +100,7 @@ def test_coefficients_of_dop853_equal_scipy_s_to_the_bit():
 @pytest.mark.parametrize("method", ["alf-dual+projection", "taylor"])
 @pytest.mark.parametrize("end", [10.0, 100.0])
 def test_error_of_a_long_run_stays_below_a_thousand_tolerances(end, method):
-    """A crank under gravity, rtol 1e-9, by the judge's truth: errors of frequency would add up."""
+    """A crank swings at rtol 1e-9; the judge's truth shows errors of its frequency, which add up."""
     scene = next(scene for scene in stability.scenes() if scene.name == f"duration[{end:g}]")
     run = simulate(scene, method, np.linspace(0.0, end, 11), Limits(rtol=1e-9))
     assert relative_error(run, scene) < 1000 * 1e-9

@@ -62,7 +62,7 @@ def test_long_chain_moves_alike_in_another_order_of_its_parts():
 
 
 def test_long_chain_moves_alike_in_a_turned_and_shifted_frame():
-    """Its positions, moved back by SHIFT and TURN_OF_FRAME, are the positions in its own frame."""
+    """Positions there, moved back by SHIFT and TURN_OF_FRAME, are those in the chain's own frame."""
     motion, other = chain_after(), chain_after(frame)
     moved_back = (other.position[0] - SHIFT) @ to_matrix(TURN_OF_FRAME)
     assert np.abs(moved_back - motion.position[0]).max() <= STEPS

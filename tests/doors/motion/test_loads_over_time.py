@@ -67,7 +67,7 @@ FAULTS = {
 
 @pytest.mark.parametrize("message", FAULTS)
 def test_faulty_function_of_time_is_refused_by_path_and_line(message, tmp_path):
-    """FAULTS has factors of a force in a scene of 2 s, by a part of the refusal, which has their line."""
+    """FAULTS maps a part of each refusal to the faulty factor of a force in a scene of 2 s."""
     text = scenes.pushed(Factor()).to_dict()
     text["load"][0]["factor"] = FAULTS[message]
     path = tmp_path / "slide.toml"

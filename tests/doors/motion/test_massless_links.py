@@ -46,7 +46,7 @@ def test_load_on_the_massless_link_of_a_gantry_swings_along_x_and_falls_along_z(
 
 @pytest.mark.parametrize("method", METHODS)
 def test_two_hinges_at_a_massless_link_move_as_a_universal_joint(method):
-    """Crossing hinges are this joint, without a massless body. METHODS agree with it to 100 rtol (m)."""
+    """Hinges whose axes cross allow what a universal joint allows. METHODS agree with it to 100 rtol (m)."""
     joint = Universal(name="u", bodies=("ground", "load"), anchor=CENTRE, axes=(X, Y))
     scene = Scene(name="u", gravity=(0.0, 0.0, -9.81), body=(LOAD,), joint=(joint,))
     other = simulate(scene, times=TIMES, rtol=RTOL)

@@ -44,7 +44,7 @@ def test_displacement_of_a_guide_is_how_far_its_slider_moved(crank):
 
 
 def test_rotation_vector_of_a_universal_joint_is_the_relative_rotation(driven):
-    """B is between crank and coupler, which stays parallel: +124.8 rad/s · t, modulo 2π."""
+    """B joins the crank and the coupler, which stays parallel: its angle is 124.8 rad/s · t, modulo 2π."""
     vector = driven.joint("B").rotation
     turned = np.arctan2(np.sin(124.8 * driven.times), np.cos(124.8 * driven.times))
     assert np.abs(vector[:, 2] - turned).max() < ROUNDING and np.abs(vector[:, :2]).max() < ROUNDING
@@ -115,7 +115,7 @@ def test_data_frame_without_pandas_names_the_package_to_install(crank, monkeypat
 
 
 def test_plot_has_a_panel_for_each_quantity(crank):
-    """A column, a vector's three and an angle: positions in one panel with legend, angles in another."""
+    """A coordinate and a position give four curves with a legend in one panel, an angle one in another."""
     axes = crank.plot("slider.position.x", "rod.position", "A.angle").axes
     assert [a.get_ylabel() for a in axes] == ["position, m", "angle, rad"]
     names = [text.get_text() for text in axes[0].get_legend().get_texts()]

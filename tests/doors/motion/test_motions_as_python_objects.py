@@ -26,7 +26,8 @@ def crank():
     "name", [n if n in GATE else pytest.param(n, marks=pytest.mark.slow) for n in MAKERS]
 )
 def test_scene_at_a_sample_continues_the_motion(name):
-    """At 0.4 of the duration, with drivers, loads over time, springs, couplings and offsets."""
+    """The scene at 0.4 of the duration, with drivers, loads over time, springs, couplings and offsets, ends
+    as the whole run, to CLOSE (m, rad/s)."""
     scene = MAKERS[name]()
     times = scene.duration * np.array([0.4, 1.0])
     whole = mbref.simulate(scene, times=times, rtol=1e-12)

@@ -38,7 +38,7 @@ def test_flat_parallelogram_at_rest_turns_as_its_crank_is_pushed():
 
 
 def test_first_sample_after_the_start_may_be_later_than_zero():
-    """From rest by 5 N m; the first sample is at 10 µs. Samples are the judge's closed form."""
+    """A moment of 5 N m moves a crank from rest; the first sample is at 10 µs. The truth is a closed form."""
     scene = flat_parallelogram(5.0)
     assert relative_error(simulate(scene, times=[1e-5, 0.5]), scene) < ROUNDING
 

@@ -38,7 +38,7 @@ def test_methods_that_run_by_turns_on_one_scene_do_not_change_each_others_positi
 
 @pytest.mark.parametrize("copy", ["with_", "model_copy"])
 def test_changed_copy_moves_by_its_own_numbers(copy):
-    """With three times the mass it moves otherwise, and to the bit as a changed scene that never ran."""
+    """With three times the mass a copy moves otherwise, and to the bit as a changed scene that never ran."""
     scene = find_scene("planar_slider_crank_gravity")
     before = simulate(scene, times=TIMES).position
     heavier = [body.model_copy(update={"mass": 3.0 * body.mass}) for body in scene.body[:1]]

@@ -61,14 +61,14 @@ def test_fast_spin_at_a_loose_tolerance_is_followed_over_every_turn(method):
 
 @pytest.mark.parametrize("method", ["lm1+none", "lm1+projection", "lm1+projection/adams", "lm1+partitioning"])
 def test_orientation_of_every_sample_is_a_unit_quaternion(method):
-    """Any length would satisfy the joint's equations, and rtol 1e-3 allows lengths to drift."""
+    """Quaternions of any length satisfy the joint's equations, and rtol 1e-3 lets their lengths drift."""
     run = completed(spinning(), method, np.linspace(0.0, 10.0, 11), Limits(rtol=1e-3))
     assert difference(np.linalg.norm(run.orientation, axis=-1), 1.0) < 1e-12  # rounding
 
 
 @pytest.mark.parametrize("method", ["mpi-svd+projection", "lm1+partitioning", "lm1+none"])
 def test_bodies_without_masses_follow_their_drivers(method):
-    """(r cos φ, r sin φ) with driven r = 1 + 2 t, φ = t + t² / 2 + sin(3 t) / 2, to 100 rtol (m)."""
+    """The tip is at (r cos φ, r sin φ); drivers set r = 1 + 2 t and φ = t + t² / 2 + sin(3 t) / 2."""
     sine = Sine(amplitude=0.5, frequency=3.0)
     hinge = Revolute(name="H", bodies=("ground", "arm"), anchor=(0, 0, 0), axis=(0, 0, 1))
     slide = Translational(name="S", bodies=("arm", "block"), anchor=(1, 0, 0), axis=(1, 0, 0))

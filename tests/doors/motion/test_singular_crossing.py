@@ -97,7 +97,7 @@ def test_flap_on_a_door_that_tilted_hinges_hold_swings_as_on_a_welded_door(tilt)
 
 @pytest.mark.parametrize("inertia", [1e-8, 1e-6])
 def test_small_bead_on_an_arm_swings_without_a_singular_position(inertia):
-    """However small its inertia (kg m²), it stays 1 m long, to 1e-12, and keeps energy, to ten rtol."""
+    """Whatever the bead's inertia (kg m²), it keeps its distance of 1 m to 1e-12, and energy to ten rtol."""
     bead = Body(name="bead", mass=1.0, inertia=(inertia,) * 3, position=(1.0, 0.0, 0.0))
     arm = Revolute(name="J", bodies=(GROUND, "bead"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0))
     scene = Scene(name="bead", gravity=(0.0, 0.0, -9.81), body=(bead,), joint=(arm,))
@@ -190,8 +190,8 @@ def test_swing_through_two_flat_positions_from_near_one_meets_its_closed_form(lo
 @pytest.mark.parametrize("loop", SWINGING)
 @pytest.mark.parametrize("distance", [1e-7, 1e-8])
 def test_motion_from_very_near_the_flat_position_is_undecided_at_its_start(loop, distance):
-    """SWINGING are parallelograms of four and five bars, released from rest ``distance`` (rad) from it:
-    rounding of 1e-16 over the squared distance decides."""
+    """SWINGING are parallelograms of four and five bars, released from rest ``distance`` (rad) from the flat
+    pose. Rounding of 1e-16 over the squared distance decides their branch."""
     run = simulate(SWINGING[loop](distance), "taylor", [0.0, 1.5])
     assert run.outcome.label == "UNDECIDED" and not len(run.times)
     assert "singular position at t = 0 s" in run.message

@@ -154,7 +154,7 @@ def test_run_from_a_singular_position_ends_at_its_start_if_the_method_does_not_c
 
 
 def test_bar_pulls_a_swinging_point_by_three_times_its_weight_component():
-    """1 kg on a bar of 1 m, released level: at φ below it the bar pulls 3 m g sin φ, to ten rtol (N)."""
+    """1 kg on a bar of 1 m is released level: at φ below level the bar pulls 3 m g sin φ, to ten rtol (N)."""
     rtol = 1e-9
     run = simulate("point_pendulum", times=np.linspace(0.0, 2.0, 21), rtol=rtol)
     along = -np.einsum("ki,ki->k", run.reactions["pivot"][:, :3], run.position[:, 0])

@@ -48,7 +48,7 @@ def test_crank_that_starts_upright_moves_its_slider_as_the_closed_form():
 
 
 def test_missing_velocities_choose_the_branch_of_the_least_kinetic_energy():
-    """Equal and upright, they turn as one body on a circle of 0.154 m; the slider rests, to rtol (m)."""
+    """Equal crank and rod, upright, turn as one body about the ground's hinge; the slider rests: to rtol."""
     times = np.linspace(0.0, 0.5, 21)
     run = simulate(upright_slider_crank(None), "taylor", times, Limits(rtol=1e-9))
     assert run.outcome.name == "COMPLETED" and "branch with the least kinetic energy" in run.message
@@ -138,7 +138,7 @@ def test_run_of_a_microsecond_from_a_singular_position_is_exact():
 @pytest.mark.parametrize("linkage", [four_bar, five_bar])
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_driven_loop_that_starts_nearly_flat_moves_as_its_closed_form(linkage, side):
-    """Distances of 1e-11 to 1e-3 rad from flat, on both sides. The driver, not rounding, decides the
+    """The loop starts 1e-11 to 1e-3 rad from flat, on either side. The driver, not rounding, decides the
     branch: no run is undecided, and the judge's closed form is met to rounding."""
     for distance in (1e-3, 1e-4, 1e-6, 1.6e-7, 1e-7, 4e-8, 1.6e-8, 6.3e-9, 1.6e-9, 1e-9, 4e-10, 1e-11):
         scene = linkage(math.pi + side * distance)
@@ -194,7 +194,7 @@ def test_spherical_loop_leaves_the_flat_position_on_the_branch_of_its_velocities
 
 
 def test_start_near_the_flat_position_of_a_spherical_loop_does_not_shorten_later_steps():
-    """Fewer than 100 steps at rtol 1e-6; rows that count as nearly dependent would take 200 000."""
+    """A run has fewer than 100 steps at rtol 1e-6; if rows counted as nearly dependent, it had 200 000."""
     scene = spherical_loop(0.3, 0.6, 1e-4, (2.0, 2.0 * ratio(0.3, 0.6)))
     centred = scene.with_("joint[B].anchor", (0.0, 0.0, 0.0)).with_("joint[D].anchor", (0.0, 0.0, 0.0))
     run = simulate(centred, "taylor", [1.0], Limits(rtol=1e-6))

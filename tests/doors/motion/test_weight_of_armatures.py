@@ -68,7 +68,7 @@ def test_armature_of_a_slide_has_no_weight_in_generated_code():
 
 
 def test_equilibrium_of_a_slide_on_a_spring_has_the_weight_of_its_mass_alone():
-    """It rests at m (g·a) / k, to 1e-10 m, and vibrates with √(k / (m + I)) rad/s, to 1e-8."""
+    """The slide rests at m (g·a) / k, to 1e-10 m, and vibrates with √(k / (m + I)) rad/s, to 1e-8."""
     stiffness = 50.0
     spring = {"type": "slide_spring", "joint": "G", "stiffness": stiffness}
     scene = slide(load=[spring])

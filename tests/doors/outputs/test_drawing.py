@@ -174,7 +174,7 @@ def test_animation_is_replaced_by_a_still_for_readers_who_prefer_reduced_motion(
 
 
 def test_motions_side_by_side_share_scale_and_time_and_a_shorter_one_stops(turning):
-    """Two in a row: 300 samples, the first 100 of them, and all again. Every third is a frame."""
+    """Three motions of 300, the first 100 and all 300 samples, two in a row; every third is a frame."""
     scene, motion = turning
     short = dataclasses.replace(
         motion, **{name: getattr(motion, name)[:100] for name in ("times", "position", "orientation")}
@@ -230,7 +230,7 @@ def test_planar_mechanism_is_viewed_along_its_normal_and_a_spatial_one_obliquely
 
 
 def test_page_shows_all_points_within_its_margins():
-    """Random points in space, a page of at most 600 by 400 px with margins of 40 px, to rounding."""
+    """Random points in space lie on a page of at most 600 by 400 px within margins of 40 px, to rounding."""
     points = np.random.default_rng(1).normal(size=(30, 3)) * np.array([5.0, 1.0, 0.1])
     page = Page.around(points, View.parse("oblique"), 600.0, 40.0, 400.0)
     margin, seen = 40 - 1e-9, page.pixels(points)  # px

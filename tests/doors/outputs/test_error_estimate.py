@@ -232,7 +232,7 @@ def ran(pendulums: Scene, folder, capsys, *options: str) -> str:
 
 
 def test_command_prints_the_estimate_of_its_json_record_and_warns(capsys, pendulums, tmp_path):
-    """The table has two digits of it. The pendulums are chaotic: rtol 1e-4 leads to large errors."""
+    """The table shows two of its digits. The pendulums are chaotic: rtol 1e-4 leads to large errors."""
     said = " ".join(ran(pendulums, tmp_path, capsys).split())
     record = json.loads(ran(pendulums, tmp_path, capsys, "--json"))["records"][0]
     [printed] = re.findall(r"largest estimated error: ([-+.\de]+)", said)

@@ -22,7 +22,7 @@ def swung(*load) -> Motion:
 
 
 def test_springs_store_half_their_stiffness_times_the_square_of_their_stretch():
-    """l = √(13 - 12 sin φ): 8 N/m (l - 1.5 m)² / 2 and 4 N m/rad (φ + 20 rad)² / 2; dampers store none."""
+    """8 N/m (l - 1.5 m)² / 2, l = √(13 - 12 sin φ) m, and 4 N m/rad (φ + 20 rad)² / 2; dampers store none."""
     ends = {"bodies": ["ground", "arm"], "points": [[0.0, 3.0, 0.0], [2.0, 0.0, 0.0]]}
     motion = swung(
         {"type": "spring", **ends, "stiffness": 8.0, "damping": 0.3, "natural_length": 1.5},
@@ -36,7 +36,7 @@ def test_springs_store_half_their_stiffness_times_the_square_of_their_stretch():
 
 
 def test_spring_of_a_slide_stores_half_its_stiffness_times_the_square_of_its_stretch():
-    """A driver moves the block by x = 2 t + 1.5 t² m; relaxed at -0.5 m: 8 N/m (x + 0.5 m)² / 2."""
+    """A driver moves x = 2 t + 1.5 t² m; the spring, relaxed at -0.5 m, has 8 N/m (x + 0.5 m)² / 2."""
     block = {"name": "block", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.8, 0.0, 0.0]}
     spring = {"type": "slide_spring", "joint": "S", "stiffness": 8.0, "damping": 0.3}
     joint, load = slide("S", "ground", "block", (0.0, 0.0, 0.0)), {**spring, "natural_displacement": -0.5}

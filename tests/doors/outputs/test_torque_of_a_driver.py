@@ -46,7 +46,7 @@ def wheels(*armatures: float, bodies=("ground", "w{}"), axis: Point = Z) -> tupl
 @pytest.mark.parametrize("method", ["taylor", "alf-dual+projection", "lm1+projection"])
 @pytest.mark.parametrize(("bodies", "axis"), [(("ground", "w{}"), Z), (("w{}", "ground"), (0.0, -3.0, 4.0))])
 def test_motor_accelerates_its_wheel_and_its_armature(bodies, axis, method):
-    """(J + I) φ'', J = 0.1, I = 2.3 kg m², for any order and axis. A hinge has no driving force (None)."""
+    """Torque (J + I) φ'', J = 0.1, I = 2.3 kg m², for any order and axis; a hinge has no driving force."""
     found = moved(*wheels(2.3, bodies=bodies, axis=axis), method).driver("A")
     assert_equal(found.torque, (0.1 + 2.3) * SECOND)
     assert_equal(found.power, (0.1 + 2.3) * SECOND * RATE)
@@ -55,7 +55,7 @@ def test_motor_accelerates_its_wheel_and_its_armature(bodies, axis, method):
 
 @pytest.mark.parametrize(("pair", "ratio"), [("AB", -3.0), ("BA", -1 / 3)])
 def test_motor_of_a_wheel_drives_the_wheel_that_meshes_with_it(pair, ratio):
-    """J + I + n² (J' + I'), as B turns by n = -3 turns in a turn of A, whichever is listed first."""
+    """The motor feels J + I + n² (J' + I'): B turns n = -3 times as fast as A, whichever is listed first."""
     mesh = [{"name": "mesh", "joints": [*pair], "ratio": ratio}]
     found = moved(*wheels(0.4, 0.7), coupling=mesh).driver("A")
     assert_equal(found.torque, (0.1 + 0.4 + 3.0**2 * (0.2 + 0.7)) * SECOND)
@@ -136,7 +136,7 @@ def test_run_states_that_the_torque_of_a_driver_that_it_prints_is_not_determined
 
 @pytest.mark.parametrize("name", [n for n in ("mujoco", "pinocchio") if installed(n)])
 def test_motion_of_an_engine_has_the_torque_of_its_motor(name):
-    """(J + I) φ'', J = 0.1, I = 0.4 kg m²; the engine's own error is below 1e-6 of the largest torque."""
+    """Torque (J + I) φ'', J = 0.1, I = 0.4 kg m²; the engine's own error is below 1e-6 of the largest."""
     bodies, joints = wheels(0.4)
     scene = Scene(name="driven", body=bodies, joint=joints, driver=[{"joint": "A", **TURN}])
     simulator = engine(name)

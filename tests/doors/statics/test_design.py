@@ -46,7 +46,7 @@ def test_assembled_four_bar_has_the_requested_lengths_and_its_changes_are_listed
 
 
 def test_assembly_of_a_closed_loop_without_requested_lengths_leaves_it_in_place_to_rounding():
-    """How far each joint and body moved (m) and turned (rad): the built-in linkage is closed already."""
+    """The built-in linkage is closed: its joints and bodies move (m) and turn (rad) by rounding alone."""
     scene = find_scene("bennett")
     found = assemble(scene, {})
     assert found.joints.keys() == {joint.name for joint in scene.joint}

@@ -33,7 +33,7 @@ def with_slide(stiffness: float, damping: float, mass: float) -> Scene:
 
 
 def test_flat_parallelogram_is_an_equilibrium_at_a_singular_position_and_has_no_modes(tmp_path, capsys):
-    """Gravity along all links: they rest. `equilibrium` reports it, `modes` refuses it."""
+    """Gravity acts along all links, so they rest: `equilibrium` reports it, and `modes` refuses it."""
     flat = parallelogram(sine=0.0, cosine=1.0).with_(gravity=(G, 0.0, 0.0))
     found = equilibria(flat, starts=2)
     assert found[0].stability == "singular" and len(found[0].eigenvalues) == 0
@@ -59,7 +59,7 @@ def test_block_on_a_level_slide_rests_everywhere_and_on_a_tilted_one_nowhere(til
 
 @pytest.mark.parametrize("natural", [0.0, np.pi])
 def test_inverted_pendulum_that_its_spring_just_holds_is_one_indifferent_equilibrium(natural):
-    """k = m g l: no stiffness at the upright pose, where the search begins, or half a turn off."""
+    """k = m g l leaves no stiffness at the upright pose, where the search begins, or half a turn off."""
     start = (0.0, ARM * np.cos(natural), 0.0)
     found = equilibria(pendulum(start, load=[spring(TORQUE, natural_angle=natural)]), starts=8)
     assert [each.stability for each in found] == ["indifferent"]
@@ -258,7 +258,7 @@ def test_springs_wound_by_many_turns_unwind_to_the_equilibrium_near_their_natura
     ],
 )
 def test_all_windings_of_a_soft_spring_have_their_equilibria(share, natural, starts, count):
-    """At each, k (φ₀ - φ) = m g l cos φ, with k = share · m g l and φ₀ = natural. The difference of both
+    """At equilibria k (φ₀ - φ) = m g l cos φ, with k = share · m g l and φ₀ = natural. The difference of both
     sides changes its sign ``count`` times in 20001 angles, to their step."""
     stiffness = share * TORQUE
     angles = natural + np.linspace(-1.01, 1.01, 20001) / share

@@ -58,7 +58,7 @@ def test_scene_of_an_equilibrium_counts_angles_from_its_pose_and_is_its_own_equi
     ],
 )
 def test_scene_without_equilibria_is_refused_with_the_driver_or_mass_that_is_the_cause(change, says):
-    """A driver accelerates, oscillates, turns across gravity or holds the only freedom; no mass."""
+    """A driver accelerates, oscillates, turns across gravity or holds all freedoms; or a mass is missing."""
     with pytest.raises(SceneError, match=says):
         equilibria(pendulum().with_(**change))
 
@@ -78,7 +78,7 @@ def test_vibration_keeps_the_constraints_and_returns_after_its_period():
 
 
 def test_command_equilibrium_prints_stability_and_reactions_and_writes_the_pose(tmp_path, capsys):
-    """It rests below and above its hinge, which carries m g = 19.62 N. The file has one pose (POSE)."""
+    """The arm rests below and above its hinge, which carries m g = 19.62 N. The file has one pose (POSE)."""
     path, rest = (str(tmp_path / name) for name in ("my.toml", "rest.toml"))
     pendulum().save(path)
     assert main(["equilibrium", path, "--starts", "6", "--out", rest]) == 0

@@ -56,14 +56,14 @@ def judged(scene: Scene, starts: int) -> list[Judged]:
 
 @pytest.mark.parametrize("seed", [0, 3])
 def test_eigenvalues_agree_with_the_judges_within_their_bounds(seed):
-    """The judge's are of its own linearised equations, where its own accelerations vanish."""
+    """The judge linearises its own equations at a pose where its own accelerations vanish."""
     (found,) = judged(at_rest(random_mechanism(seed)), starts=1)
     assert found.acceleration < BALANCED and found.eigenvalues <= 1
 
 
 def test_eigenvalues_of_two_equilibria_of_a_leg_of_seven_links_are_the_judges():
-    """Its 50 constraint rows, 9 of them redundant, are solved by sparse factorisations. Differences from the
-    judge's eigenvalues are at most the stated bounds; accelerations vanish."""
+    """The leg's 50 constraint rows, 9 of them redundant, are solved by sparse factorisations. Differences
+    from the judge's eigenvalues are at most the stated bounds; accelerations vanish."""
     first, second = judged(find_scene("strandbeest[1]"), starts=16)
     assert max(first.acceleration, second.acceleration) < BALANCED
     assert max(first.eigenvalues, second.eigenvalues) <= 1
