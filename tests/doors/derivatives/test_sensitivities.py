@@ -133,11 +133,14 @@ def test_positions_of_a_driven_linkage_depend_on_pins_as_in_closed_form_and_not_
     assert np.abs(found.values[:, 0, 4]).max() <= 1e-13  # m/kg: rounding of positions of 1 m
 
 
-def test_angle_of_geared_wheels_depends_on_ratio_and_inertia_as_in_closed_form():
-    """φ = M t²/(2 (I₁ + r² I₂)) with the moment M = 2 N m, I₁ = 0.03 and I₂ = 0.2 kg m², r = -0.5."""
-    times, numbers = np.array([0.5, 2.0]), {"inertia": 0.2, "ratio": -0.5}
+@pytest.mark.parametrize("own_ratio", [-0.5, -1.0], ids=["unequal wheels", "equal wheels"])
+def test_angle_of_geared_wheels_depends_on_ratio_and_inertia_as_in_closed_form(own_ratio):
+    """φ = M t²/(2 (I₁ + r² I₂)) with the moment M = 2 N m, I₁ = 0.03 and I₂ = 0.2 kg m²; with r = -1 both
+    factors of the coupling's row are the largest one, by which it is divided."""
+    times, numbers = np.array([0.5, 2.0]), {"inertia": 0.2, "ratio": own_ratio}
     paths = ["body[wheel].inertia[2]", "coupling[teeth].ratio"]
-    found = mbref.sensitivities(gear_pair(), ["A.angle"], paths, times)
+    scene = gear_pair().with_("coupling[teeth].ratio", own_ratio)
+    found = mbref.sensitivities(scene, ["A.angle"], paths, times)
     for k, name in enumerate(numbers):
         true = slope(lambda inertia, ratio: times**2 / (0.03 + ratio**2 * inertia), numbers, name)
         assert_close(found.values[:, 0, k], true)
