@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,7 @@ from crosscheck.conformance.mechanisms.specimens import Specimen, specimens
 from crosscheck.engine import ALL, BUILT_IN, all_engines, default_engines, engine
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.pieces import events
+from crosscheck.study.grid import shown_name
 from mbref.command_line import MOST_DURATION
 from mbref.scene import Scene, intervals
 from mbref.scene.fields import meant
@@ -42,7 +43,21 @@ def find_engines(names: Sequence[str] | None, notice: Notice) -> list[str]:
         raise RequestError(*missing.values())
     for reason in missing.values():
         notice(reason)
-    return [name for name in wanted if name not in missing]
+    found = [name for name in wanted if name not in missing]
+    if faults := [*_equal_names(found)]:
+        raise RequestError(*faults)
+    return found
+
+
+def _equal_names(names: Sequence[str]) -> Iterator[str]:
+    """Yield a fault for each engine whose records would have the name of another engine."""
+    shown: dict[str, str] = {}
+    for name in names:
+        if (first := shown.setdefault(shown_name(name), name)) != name:
+            yield (
+                f"engines {first!r} and {name!r} both have the name {shown_name(name)!r}: "
+                "give the attribute `name` of one another value"
+            )
 
 
 def find_engine(name: str, notice: Notice) -> str:

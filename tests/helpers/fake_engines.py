@@ -51,11 +51,15 @@ class Segfault(Fake):
 
 
 class Refusing(Fake):
+    name = "refusing fake"
+
     def cannot(self, scene: Scene) -> Cannot:
         return Cannot(Owner.MODEL, "this fake runs nothing")
 
 
 class NoSettings(Fake):
+    name = "fake without settings"
+
     def settings(self, scene: Scene) -> list[Setting]:
         raise ValueError("no table of steps")
 

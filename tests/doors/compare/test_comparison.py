@@ -130,3 +130,9 @@ def test_a_quick_comparison_runs_mbref_at_its_default_method():
     scene = SCENES["four_bar_gravity"]()
     families = {case.setting.family for case in of_few_families(default_cases(scene, ["mbref"])[0])}
     assert "taylor" in families and engine("mbref").best_settings(scene)[0].family == "taylor"
+
+
+def test_two_engines_of_one_name_are_refused():
+    """Records of both engines would be of one: runs of the other engine would be judged as its own."""
+    with pytest.raises(RequestError, match="both have the name 'fake'"):
+        crosscheck.compare(BLOCK, [f"{FAKES}:FAKE", f"{FAKES}:KEEPING"])
