@@ -77,7 +77,8 @@ def _ranked(group: Judged, letters: Mapping[tuple[str, str], str], with_ratio: b
     """Return the table of runs in the order of increasing error; ``with_ratio`` adds times as multiples of
     the fastest."""
     records = group.records
-    fastest = min((_cost(r) for r in group.comparable if is_completed(r)), default=math.nan)
+    timed = (_cost(r) for r in group.comparable if is_completed(r))
+    fastest = min((seconds for seconds in timed if seconds > 0), default=math.nan)
     header = ("", "engine, family", "settings", "verdict", "error", "time (s)", *["ratio"] * with_ratio)
     table = _table("runs", header, 4)
     for r in sorted(records, key=lambda r: (not is_completed(r), error(r))):
@@ -88,7 +89,7 @@ def _ranked(group: Judged, letters: Mapping[tuple[str, str], str], with_ratio: b
             error_text(r),
             _seconds(r),
         )
-        ratio = f"{_cost(r) / fastest:.1f}" if is_completed(r) and fastest > 0 else "–"
+        ratio = f"{_cost(r) / fastest:.1f}" if is_completed(r) and _cost(r) > 0 and fastest > 0 else "–"
         table.add_row(*row, *[ratio] * with_ratio)
     return table
 
@@ -175,10 +176,12 @@ def _counts(group: Judged) -> str:
 
 
 def _print_best(console: Console, group: Judged) -> None:
-    """Print constraint violation, energy error and reaction error of each engine's most accurate run."""
-    header = ("engine, family", "settings", "error", *BEST.values())
-    table = _table("every engine's run of least error", header, 2)
-    for r in group.best().values():
+    """Print constraint violation, energy error and reaction error of each engine's most accurate run, or of a
+    finest run if no error is known."""
+    header, best = ("engine, family", "settings", "error", *BEST.values()), group.best()
+    title = "a finest run of every engine" if _no_error(best) else "every engine's run of least error"
+    table = _table(title, header, 2)
+    for r in best.values():
         measured = [_measured(r, metric) for metric in BEST]
         table.add_row(*_identity(r, group.records), error_text(r), *measured)
     console.print(table)
@@ -190,11 +193,20 @@ def _print_advice(console: Console, group: Judged, path: str) -> None:
     """Print the command of each engine's fastest run within the error LEVEL, otherwise of its most accurate
     run."""
     cheapest, best = group.cheapest(LEVEL), group.best()
+    if _no_error(best):
+        console.print("\nsettings to use: none is known to be right, because no error is known")
+        return
     console.print(f"\nsettings to use: the fastest run within {SAID}, otherwise the most accurate run")
     for name in best:
         r = cheapest.get(name, best[name])
         if is_completed(r):
             console.print(f"  error {error_text(r)}, {_seconds(r)} s: {command(r, path)}", soft_wrap=True)
+
+
+def _no_error(best: Mapping[str, Record]) -> bool:
+    """Return whether runs completed and the error of none is known."""
+    completed = [r for r in best.values() if is_completed(r)]
+    return bool(completed) and not any(math.isfinite(error(r)) for r in completed)
 
 
 def _print_own_code(console: Console, group: Judged) -> None:
@@ -245,8 +257,8 @@ def _measured(record: Record, metric: str) -> str:
 
 
 def _seconds(record: Record) -> str:
-    """Return the time of stepping as text; – for a run that ended at its start."""
-    return "–" if never_moved(record) else _number(_cost(record))
+    """Return the time of stepping as text; – for a run that ended at its start or has no time."""
+    return "–" if never_moved(record) or not _cost(record) else _number(_cost(record))
 
 
 def _print_messages(console: Console, records: Sequence[Record]) -> None:

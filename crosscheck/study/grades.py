@@ -6,6 +6,7 @@ import enum
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from crosscheck.judge.metrics import cost_at_error, error_series
 from crosscheck.judge.mobility import mobility
 from crosscheck.judge.tolerances import FALSE_SUCCESS, FLOOR
 from crosscheck.study.grid import Record
-from crosscheck.study.record_view import error, is_completed
+from crosscheck.study.record_view import error, error_bound, is_completed
 from crosscheck.study.search.least_errors import LeastError, least_errors
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
@@ -36,17 +37,16 @@ class Grade(enum.Enum):
         return self.value
 
 
-LIMITS = {Grade.RIGHT: FLOOR, Grade.INACCURATE: FALSE_SUCCESS}  # largest error of each grade
-
-
 def grade(record: Record) -> Grade:
-    """Return RIGHT for errors up to FLOOR, INACCURATE up to FALSE_SUCCESS, otherwise WRONG; UNJUDGED without
-    a truth."""
+    """Return RIGHT for errors up to FLOOR or up to the bound on the truth's own error, INACCURATE up to
+    FALSE_SUCCESS, otherwise WRONG; UNJUDGED without a truth."""
     if not is_completed(record):
         return Grade.FAILED
     if record["metrics"].get("error") is None:
         return Grade.UNJUDGED
-    return next((g for g, limit in LIMITS.items() if error(record) <= limit), Grade.WRONG)
+    if error(record) <= max(FLOOR, error_bound(record)):
+        return Grade.RIGHT
+    return Grade.INACCURATE if error(record) <= FALSE_SUCCESS else Grade.WRONG
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,8 @@ class Judged:
         return {least.engine: least for least in least_errors(self.comparable)}
 
     def best(self) -> dict[str, Record]:
-        """Return for each engine the record of least error, otherwise the record that ended last."""
+        """Return for each engine the record of least error, without a truth that of a finest run, otherwise
+        the record that ended last."""
         return {name: least.best for name, least in self.engines().items()}
 
     def defaults(self) -> dict[str, Record]:
@@ -133,17 +134,19 @@ class Judged:
         return {r["engine"]: r for r in reversed(order)}
 
     def agreement(self) -> dict[tuple[str, str], float]:
-        """Return for each pair of engines the largest difference between their finest completed runs; used if
-        there is no truth."""
-        finest = {r["engine"]: r for r in self.comparable if is_completed(r)}
-        motions = {n: Trajectory.from_record(self.scene.name, r) for n, r in finest.items()}
-        names = list(motions)
-        return {
-            (a, b): float(error_series(self.scene, motions[a], motions[b]).max(initial=0.0))
-            for i, a in enumerate(names)
-            for b in names[i + 1 :]
-            if np.array_equal(motions[a].times, motions[b].times)
-        }
+        """Return for each pair of engines the largest difference between two completed runs, the finest ones
+        of the families that agree best; used if there is no truth."""
+        finest = {(r["engine"], r["family"]): r for r in self.comparable if is_completed(r)}
+        motions: dict[str, list[Trajectory]] = {}
+        for (name, _), record in finest.items():
+            motions.setdefault(name, []).append(Trajectory.from_record(self.scene.name, record))
+        found = {pair: self._apart(*(motions[name] for name in pair)) for pair in combinations(motions, 2)}
+        return {pair: apart for pair, apart in found.items() if apart is not None}
+
+    def _apart(self, first: Sequence[Trajectory], second: Sequence[Trajectory]) -> float | None:
+        """Return the least of the largest differences between runs of two engines at equal times."""
+        pairs = ((a, b) for a in first for b in second if np.array_equal(a.times, b.times))
+        return min((float(error_series(self.scene, a, b).max(initial=0.0)) for a, b in pairs), default=None)
 
 
 def _family_costs(least: LeastError, level: float) -> list[Fastest]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -16,7 +17,8 @@ HEADER = ("scene", "engine", "family", "settings", "least error", "time (s)", f"
 class LeastError:
     """Best runs of an engine on a scene, one for each family; ``records`` are all its runs.
 
-    The best run is the completed run of least error, otherwise the run that ended last.
+    The best run is the completed run of least error, without a truth the last completed one, otherwise the
+    run that ended last.
     """
 
     scene: str
@@ -26,8 +28,8 @@ class LeastError:
 
     @property
     def best(self) -> Record:
-        """Return the run of least error; if none completed, the run that ended last."""
-        return min(self.families.values(), key=rank)
+        """Return the best run of all families."""
+        return _best(list(self.families.values()))
 
     @property
     def is_reached(self) -> bool:
@@ -63,9 +65,17 @@ def least_errors(records: Sequence[Record]) -> list[LeastError]:
         for engine in dict.fromkeys(record["engine"] for record in group):
             own = [record for record in group if record["engine"] == engine]
             families = dict.fromkeys(record["family"] for record in own)
-            best = {name: min((r for r in own if r["family"] == name), key=rank) for name in families}
+            best = {name: _best([r for r in own if r["family"] == name]) for name in families}
             found.append(LeastError(scene, engine, best, own))
     return found
+
+
+def _best(records: Sequence[Record]) -> Record:
+    """Return the first record by ``rank``; the last completed one, which is finest, if no error is known."""
+    found = min(records, key=rank)
+    if not is_completed(found) or math.isfinite(error(found)):
+        return found
+    return [record for record in records if is_completed(record)][-1]
 
 
 def rank(record: Record) -> tuple[bool, float, float]:

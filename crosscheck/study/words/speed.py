@@ -56,10 +56,22 @@ def fast(groups: Sequence[Judged]) -> str:
     costs = {name: cost for name, cost in found.items() if cost}
     if not any(group.is_judged for group in groups):
         return "Without a truth no error is known, so speeds are not compared."
-    if not costs:
+    others = [n for n in engines_of(groups) if not any(n in cost for cost in costs.values())]
+    untimed = [n for n in others if any(n in group.cheapest(LEVEL) for group in groups)]
+    if not costs and not untimed:
         return f"No engine reaches an error of {SAID}, so speeds are not compared."
-    never = [n for n in engines_of(groups) if not any(n in cost for cost in costs.values())]
+    if not costs:
+        each = (
+            f"{listed(map(title, untimed))} {'reaches' if len(untimed) == 1 else 'reach'} an error of {SAID}"
+        )
+        return f"{each}, without a time of stepping, so speeds are not compared."
+    never = [n for n in others if n not in untimed]
     end = f" {listed(map(title, never))} {'does' if len(never) == 1 else 'do'} not reach it." if never else ""
+    end += (
+        f" {listed(map(title, untimed))} {'gives' if len(untimed) == 1 else 'give'} no time."
+        if untimed
+        else ""
+    )
     aided = {
         (n, g.scene.name) for g in groups for n, (_, r) in g.fastest(LEVEL).items() if is_integrated_here(r)
     }

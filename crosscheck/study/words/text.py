@@ -19,7 +19,8 @@ def at_most(value: float, bound: float) -> str:
     if not value:
         return "0"
     exponent = math.floor(math.log10(value))
-    return f"{math.ceil(value / 10.0 ** (exponent - 1)) / 10:.1f}e{exponent}"
+    tenths = math.ceil(value / 10.0 ** (exponent - 1))
+    return f"{tenths / 10:.1f}e{exponent}" if tenths < 100 else f"1.0e{exponent + 1}"
 
 
 def runs(number: int) -> str:

@@ -71,6 +71,16 @@ def test_grade_follows_from_the_error_of_a_completed_run(error, expected):
     assert grade(record("a", "b", error, outcome="TIMED_OUT")) is Grade.FAILED
 
 
+@pytest.mark.parametrize(
+    ("error", "bound", "expected"), [(9e-7, 1e-6, Grade.RIGHT), (2e-6, 1e-6, Grade.INACCURATE)]
+)
+def test_a_run_that_agrees_with_the_truth_to_its_bound_is_not_inaccurate(error, bound, expected):
+    """A reference known to 1e-6 cannot tell an engine with an error of 9e-7 from an exact one."""
+    own = record("mbref", "own", error, metrics={"error": error, "error_bound": bound})
+    assert grade(own) is expected
+    assert ("inaccurate" in right([group([own], bound=bound)])) is (expected is Grade.INACCURATE)
+
+
 # parts of SITUATIONS, whose names say what the records are for
 TUNED, COMPILED = "tuned", "newton, compiled"  # families: an engine's own integrator, and crosscheck's
 UNKNOWN = {"kind": "", "bound": None, "until": 0.0, "reason": "it starts in a singular position"}
@@ -162,6 +172,45 @@ def test_distance_of_two_runs_is_measured_only_at_equal_times():
     scene, other = synthetic.scene(), {**first, "engine": "c", "times": [0.5 * t for t in first["times"]]}
     found = Judged(scene, {}, [first, second, other]).agreement()
     assert found == {("a", "b"): pytest.approx(1e-3, rel=1e-9)}, found
+
+
+def test_engines_agree_by_the_finest_runs_of_the_families_that_agree_best():
+    """Engine b lists its defaults, off by 1e-3 of the length, after its tuned family, which equals a's."""
+    fine = [synthetic.record(name, "tuned", 1e-9, 0.1) for name in ("a", "b")]
+    runs = [*fine, synthetic.record("b", "defaults", 1e-3, 0.1)]
+    assert Judged(synthetic.scene(), {}, runs).agreement()["a", "b"] < 1e-15
+
+
+def printed(records: Sequence[dict[str, Any]], scene=REDUNDANT, **known: Any) -> str:
+    """Return what `crosscheck compare` prints on the records."""
+    console, found = Console(width=200, record=True, file=io.StringIO()), [group(records, scene, **known)]
+    tables.print_comparison(console, found[0], verdict(found), "my.toml", with_ratio=True)
+    return console.export_text()
+
+
+def test_without_a_truth_no_setting_is_called_most_accurate():
+    """Two runs of a motion without a truth, coarse to fine, have no errors: no setting is recommended, and
+    the finest run stands in the table of one run an engine."""
+    runs = [synthetic.record("mbref", "own", 1e-9, 0.1, step=step) for step in (0.1, 0.2)]
+    shown = printed([{**run, "metrics": {}} for run in runs], synthetic.scene(), **UNKNOWN)
+    assert "least error" not in shown and "most accurate" not in shown and "crosscheck run" not in shown
+    assert "a finest run of every engine" in shown
+    assert "step=0.2" in shown.partition("a finest run")[2].partition("settings to use")[0]
+
+
+def test_a_right_engine_that_gives_no_time_of_stepping_reaches_its_error():
+    """Both engines are right; one gives no time, as an adapter that leaves out the cost. It gets no time and
+    no ratio, and the other engine keeps its own."""
+    runs = [record("mbref", "own", 1e-9, 0.5), record("exudyn", "own", 1e-9, 0.0)]
+    shown = printed(runs)
+    assert "Exudyn gives no time." in shown and "not reach" not in shown and "0.00e+00" not in shown
+    assert re.search(r"mbref own .* 1\.0\n", shown)
+    assert fast([group(runs[1:])]).startswith("Exudyn reaches an error of 1e-6, without a time of stepping")
+
+
+@pytest.mark.parametrize(("error", "text"), [(9.96e-9, "1.0e-8"), (9.86e-9, "9.9e-9")])
+def test_an_error_rounded_up_to_two_digits_has_one_digit_before_the_point(error, text):
+    assert f"to {text}." in right([group([record("mbref", "own", error)])])
 
 
 def saved(folder: Path, records: list[dict]) -> Path:
