@@ -118,9 +118,10 @@ def explanations(bench: Bench) -> Changes:
     found = {(each.part, each.change): True for each in changed if explains(each.terms)}
     freedoms = len(own) - rank_of(np.linalg.svd(terms.rows, compute_uv=False))
     for scaled in scaled_terms(scene, terms):
-        factor = _factor(scene, scaled, own)
-        words = _words(factor)
-        if explains(scaled.times(factor)):
+        tried = (_factor(scene, scaled, own), *(FACTORS if scaled.is_armature else ()))
+        factor = next((each for each in tried if explains(scaled.times(each))), None)
+        if factor is not None:
+            words = _words(factor)
             found[scaled.part, f"{scaled.name} {words}"] = freedoms > 1 or words in FACTORS.values()
     return found
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ from crosscheck.judge.constraints import (
 from crosscheck.judge.coupling_laws import unwound
 from crosscheck.judge.gauss_motion import State, applied
 from crosscheck.judge.gauss_principle import of_least_constraint
+from crosscheck.judge.joint_coordinates import Reflected, reflected
 from crosscheck.judge.joint_loads import turning_loads
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
@@ -30,11 +32,12 @@ GRAVITY = "gravity"
 class Terms(NamedTuple):
     """The terms of a scene's equations at a state: M a = Σ f + Jᵀ λ, J a = γ.
 
-    Mass matrix (6 nb, 6 nb), forces (6 nb,) by name, rows (m, 6 nb) with the joint of each, and the parts of
-    γ (m,) that velocities and drivers cause.
+    Mass matrix (6 nb, 6 nb) of the bodies, armatures, which add to M and f, forces (6 nb,) by name, rows
+    (m, 6 nb) with the joint of each, and the parts of γ (m,) that velocities and drivers cause.
     """
 
     mass: np.ndarray
+    armatures: Reflected
     forces: Mapping[str, np.ndarray]
     rows: np.ndarray
     joints: tuple[str, ...]
@@ -44,11 +47,13 @@ class Terms(NamedTuple):
 
 class Scaled(NamedTuple):
     """A term of the equations of motion, the part of an engine that computes it, and the terms with a
-    multiple of it."""
+    multiple of it. An armature may be much larger than the inertia that it adds to: accelerations are then
+    far from linear in its multiple."""
 
     part: str
     name: str
     times: Callable[[float], Terms]
+    is_armature: bool = False
 
 
 class Variant(NamedTuple):
@@ -78,16 +83,17 @@ def terms_at(scene: Scene, motion: Trajectory, sample: int) -> Terms:
         for name, found in closure_accelerations(scene, t, position, orientation, *[still] * 4).items()
         for _ in found
     )
-    return Terms(_mass(scene, orientation), _forces(scene, t, state), rows, names, driven - moved, -driven)
+    mass, armatures = _mass(scene, orientation), reflected(scene, *state[:4])
+    return Terms(mass, armatures, _forces(scene, t, state), rows, names, driven - moved, -driven)
 
 
 def accelerations(scene: Scene, terms: Terms) -> np.ndarray:
     """Return the accelerations (6 nb,) that the terms give, by Gauss's principle; angular accelerations times
     the scene's length."""
     weights = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))
-    force = np.sum(list(terms.forces.values()), axis=0)
+    force = np.sum(list(terms.forces.values()), axis=0) + terms.armatures.force
     gamma = terms.of_velocities + terms.of_drivers
-    return of_least_constraint(terms.mass, force, terms.rows, -gamma, weights)
+    return of_least_constraint(terms.mass + terms.armatures.mass, force, terms.rows, -gamma, weights)
 
 
 def variants(scene: Scene, orientation: np.ndarray, terms: Terms) -> Iterator[Variant]:
@@ -107,12 +113,13 @@ def variants(scene: Scene, orientation: np.ndarray, terms: Terms) -> Iterator[Va
         kept = np.array([name != joint for name in terms.joints])
         rows = {key: getattr(terms, key)[kept] for key in ("rows", "of_velocities", "of_drivers")}
         names = tuple(name for name in terms.joints if name != joint)
-        yield Variant(PARTS[4], f"joint {joint!r} left out", terms._replace(joints=names, **rows))
+        kind = "coupling" if any(coupling.name == joint for coupling in scene.coupling) else "joint"
+        yield Variant(PARTS[4], f"{kind} {joint!r} left out", terms._replace(joints=names, **rows))
 
 
 def scaled_terms(scene: Scene, terms: Terms) -> Iterator[Scaled]:
-    """Yield each term for multiples of it: forces, parts of γ, and mass and inertia of a body, with the
-    gravity and gyroscopic moment that they cause."""
+    """Yield each term for multiples of it: forces, parts of γ, armatures, and mass and inertia of a body,
+    with the gravity and gyroscopic moment that they cause."""
     for name in terms.forces:
         part = {GRAVITY: PARTS[1], GYRATION: PARTS[2]}.get(name, PARTS[3])
         yield Scaled(part, name, partial(_with_forces, terms, {name}))
@@ -124,6 +131,9 @@ def scaled_terms(scene: Scene, terms: Terms) -> Iterator[Scaled]:
         (PARTS[5], "the drivers' accelerations in γ", "of_drivers"),
     ):
         yield Scaled(part, name, partial(_with_multiple, terms, field))
+    for k, joint in enumerate(terms.armatures.joints):
+        times = partial(_with_armature, terms, k)
+        yield Scaled(PARTS[0], f"the armature of joint {joint!r}", times, is_armature=True)
     places = [(f"body {body.name!r}", slice(b, b + 1)) for b, body in enumerate(scene.body)]
     for whose, bodies in [*places, ("every body", slice(None))]:
         for name, half, force in (("mass", slice(0, 3), GRAVITY), ("inertia", slice(3, 6), GYRATION)):
@@ -141,6 +151,12 @@ def _with_forces(terms: Terms, names: Collection[str], factor: float) -> Terms:
 
 def _with_multiple(terms: Terms, field: str, factor: float) -> Terms:
     return terms._replace(**{field: factor * getattr(terms, field)})
+
+
+def _with_armature(terms: Terms, place: int, factor: float) -> Terms:
+    inertia = terms.armatures.inertia.copy()
+    inertia[place] *= factor
+    return terms._replace(armatures=replace(terms.armatures, inertia=inertia))
 
 
 def _with_inertia(terms: Terms, chosen: np.ndarray, name: str, factor: float) -> Terms:

@@ -1,6 +1,7 @@
 """The hint for a failing engine, the example engine with one known defect, names the wrong term."""
 
 import importlib.util
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from crosscheck.conformance.hint import Failure, hint
 from crosscheck.conformance.mechanisms.specimens import specimens
 from crosscheck.conformance.runners import InProcess
 from crosscheck.conformance.suite import held_against
+from crosscheck.engine import engine
 
 PATH = Path(__file__).parents[3] / "examples" / "spatial_engine" / "spatial_engine.py"
 SPEC = importlib.util.spec_from_file_location("spatial_engine_with_defects", PATH)
@@ -103,3 +105,32 @@ def test_result_of_verify_on_a_failing_engine_has_the_hint(monkeypatch):
     failing = held_against(runner_with("gravity", monkeypatch), [KNOWN["free_fall"]])
     assert "gravity left out explains 1 of 1 scenes" in failing.hint and not failing.conforms
     assert failing.to_record()["hint"] == failing.hint
+
+
+class Geared(type(engine("mbref"))):
+    """mbref with a ``defect``: joints have ``factor`` times their armature, no coupling, or all positions are
+    given 0.1 mm aside."""
+
+    def __init__(self, defect: str, factor=1.0):
+        self.defect, self.factor = defect, factor
+
+    def run(self, scene, times, setting):
+        joints = [j.model_copy(update={"armature": self.factor * j.armature}) for j in scene.joint]
+        changes = {"armature": {"joint": joints}, "coupling": {"coupling": ()}}.get(self.defect, {})
+        found = super().run(scene.with_(**changes), times, setting)
+        return replace(found, position=found.position + 1e-4) if self.defect == "output" else found
+
+
+@pytest.mark.parametrize(
+    ("defect", "scene", "says"),
+    [
+        (("armature", 0.0), "armature pendulum", "the armature of joint 'A' left out explains 1 of 1"),
+        (("armature", 2.0), "armature pendulum", "the armature of joint 'A' counted twice explains 1 of 1"),
+        (("output",), "armature pendulum", "accelerations agree with the judge's"),
+        (("coupling",), "gear pair", "look at the constraints: coupling 'teeth' left out"),
+    ],
+)
+def test_hint_knows_armatures_and_couplings(defect, scene, says):
+    """The judge's accelerations contain armatures: an engine with them is right, one without them wrong."""
+    found = hint(InProcess(Geared(*defect), "mbref"), [Failure(KNOWN[scene], "truth")])
+    assert says in found, found
