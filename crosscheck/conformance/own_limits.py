@@ -19,12 +19,12 @@ An expected failure is strict: if the check passes on such a scene, it fails unt
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from crosscheck.conformance.suite import EXPECTED, FAIL, PASS, Verdict, abouts
+from crosscheck.conformance.suite import EXPECTED, FAIL, PASS, UNKNOWN, Verdict, abouts
 from crosscheck.study.record_shape import Verdicts, checked
 from mbref.records import RecordsError, json_content
 from mbref.scene import SceneError
@@ -60,15 +60,17 @@ class OwnLimits:
         return self._beside_baseline(verdict)
 
     def _beside_baseline(self, verdict: Verdict) -> Verdict:
-        """Return a failure as expected if it is no worse than in the baseline."""
+        """Return a failure as expected if it is no worse than in the baseline, and a failure for a check that
+        passes in the baseline and now cannot run."""
         before = self.baseline.get((verdict.property, verdict.scene))
-        if verdict.status != FAIL or before is None or before.check() != verdict.check():
+        if verdict.status == PASS or before is None or before.check() != verdict.check():
             return verdict
-        if before.status == PASS:
-            return replace(verdict, reason=f"{verdict.reason}; it passes in the baseline".lstrip("; "))
-        if before.status not in (FAIL, EXPECTED):
+        if before.status == PASS and not verdict.reason.startswith(UNKNOWN):
+            says = f"{verdict.reason}; it passes in the baseline".lstrip("; ")
+            return replace(verdict, status=FAIL, reason=says)
+        if verdict.status != FAIL or before.status not in (FAIL, EXPECTED):
             return verdict
-        now, then = verdict.measured, before.measured
+        now, then = _measured(verdict, before)
         if now is None or then is None:
             no_worse, values = now is then, ""
         else:
@@ -78,6 +80,13 @@ class OwnLimits:
         return replace(
             verdict, reason=f"{verdict.reason}; the baseline has{values or ' a value'}".lstrip("; ")
         )
+
+
+def _measured(*verdicts: Verdict) -> Iterator[float | None]:
+    """Yield the measured values, None for one that is not finite, as files have it."""
+    for verdict in verdicts:
+        value = verdict.measured
+        yield value if value is not None and math.isfinite(value) else None
 
 
 def _of(table: Mapping[Key, Any], verdict: Verdict) -> Any:

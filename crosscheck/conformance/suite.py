@@ -29,6 +29,7 @@ from mbref.records import finite
 PASS, FAIL, CANNOT, OUTSIDE = "pass", "fail", "cannot", "outside"
 EXPECTED = "expected"  # a failure that the author of the engine expects
 REFUSAL, RUN = "refusal", "run"
+UNKNOWN = "its exact motion is not known"  # reason of a check that is outside
 MARK_OF_EXPECTED = {EXPECTED: ("≈", "yellow")}
 MARKS = {PASS: ("✓", "green"), FAIL: ("✗", "bold red"), CANNOT: ("–", "yellow"), OUTSIDE: ("○", "dim")}
 FIRST = {
@@ -215,7 +216,7 @@ def judged(label: str, bench: Bench) -> Verdict:
     except (Broken, ChildFailed) as broken:
         return Verdict(label, bench.scene.name, FAIL, reason=str(broken))
     except NoExact as unknown:
-        return Verdict(label, bench.scene.name, OUTSIDE, reason=f"its exact motion is not known: {unknown}")
+        return Verdict(label, bench.scene.name, OUTSIDE, reason=f"{UNKNOWN}: {unknown}")
     if isinstance(found, Finding):
         status = PASS if found.measured <= found.allowed else FAIL
         return Verdict(label, bench.scene.name, status, found.measured, found.allowed, found.remark)

@@ -1,6 +1,7 @@
 """Own limits, strict expected failures, baseline, time budget and JUnit files of the conformance suite."""
 
 import json
+import math
 from dataclasses import replace
 from xml.etree import ElementTree
 
@@ -97,6 +98,35 @@ def test_failure_no_worse_than_in_the_baseline_does_not_count(right, wrong, tmp_
     assert all("passes in the baseline" in v.reason for v in judged)
 
 
+def saved(found: suite.Conformance, folder) -> OwnLimits:
+    """Return the limits by a file of the verdicts as the baseline."""
+    (folder / "before.json").write_text(json.dumps(found.to_record()))
+    return OwnLimits(baseline=read_baseline(folder / "before.json"))
+
+
+@pytest.mark.parametrize(("status", "reason"), [("cannot", "no licence"), ("outside", "gives no reactions")])
+def test_a_check_that_passes_in_the_baseline_has_to_run_and_pass(right, status, reason, tmp_path):
+    """An engine refuses a scene that it ran before, or gives fewer numbers than before: it is worse. A truth
+    that could not be computed says nothing on the engine."""
+    before = saved(right, tmp_path)
+    passed = next(v for v in right.verdicts if v.status == "pass")
+    judged = before.judged(replace(passed, status=status, measured=None, reason=reason))
+    assert judged.status == "fail" and judged.reason == f"{reason}; it passes in the baseline"
+    unknown = replace(
+        passed, status="outside", reason="its exact motion is not known: the CPU time has passed"
+    )
+    assert before.judged(unknown) == unknown
+
+
+def test_a_failure_that_is_not_finite_is_no_worse_than_itself_in_the_baseline(wrong, tmp_path):
+    """JSON has no infinite numbers: the file has null for them."""
+    lost = [replace(failed(wrong)[0], measured=value) for value in (math.inf, math.nan)]
+    for verdict in lost:
+        before = saved(replace(wrong, verdicts=[verdict]), tmp_path)
+        assert before.judged(verdict).status == "expected"
+        assert before.judged(failed(wrong)[1]).status == "fail"
+
+
 @pytest.mark.parametrize(
     ("verdicts", "said"),
     [
@@ -136,6 +166,23 @@ def test_junit_file_has_the_checks_that_ran_with_numbers_and_no_other_case(wrong
     assert suite_.get("failures") == str(len(failed(found))) and suite_.get("skipped") == "1"
     failure = suite_.find("testcase/failure")
     assert "allowed" in failure.get("message") and failure.text == found.hint != ""
+
+
+def test_junit_file_of_an_engine_that_runs_no_scene_has_a_failure(right):
+    """The command ends with status 1: a test server has to show a failure too."""
+    refusal = suite.Verdict("refusal", "free_fall", "cannot", reason="no licence")
+    for verdicts in ([], [refusal]):
+        found = replace(right, verdicts=verdicts)
+        made = ElementTree.fromstring(junit(found).partition("\n")[2]).find("testsuite")
+        assert not found.conforms and made.get("failures") == made.get("tests") == "1"
+        assert "runs no scene" in made.find("testcase/failure").get("message")
+
+
+def test_junit_file_is_xml_whatever_an_engine_says(wrong):
+    """XML has no control characters, which an engine's message may have: they are written as escapes."""
+    said = replace(failed(wrong)[0], reason="code \x1b[31m \x00 <b> & end", measured=None)
+    made = ElementTree.fromstring(junit(replace(wrong, verdicts=[said])).partition("\n")[2])
+    assert r"code \x1b[31m \x00 <b> & end" in made.find("testsuite/testcase/failure").get("message")
 
 
 @pytest.mark.parametrize(
