@@ -11,6 +11,7 @@ import numpy as np
 
 from mbref.design.derivatives.columns import without_derivative
 from mbref.design.derivatives.free_numbers import FreeNumbers
+from mbref.design.derivatives.given_values import nearest_signs, refuse_wrapped
 from mbref.design.derivatives.natural_units import natural_units
 from mbref.design.derivatives.numbers_of_scene import AccurateStencils
 from mbref.design.derivatives.result import with_none
@@ -28,6 +29,7 @@ FIT_RTOL = 1e-10  # relative tolerance of the runs; derivatives then have about 
 # change of all columns over their sizes if a number doubles, that is rounding of derivatives (1e-14)
 NO_INFLUENCE = 1e-10
 CONSTANT = 1e-8  # standard deviation of a column / its size that is an error of the runs (1e-10) or rounding
+FEWEST_FREE = 3  # degrees of freedom of a column's residuals, from which their own variance counts
 FIT_TOLERANCE = 1e-12  # relative changes of the sum of squares and of the numbers that end the iteration
 
 
@@ -120,8 +122,9 @@ def fit(
         If the scene has no number at a path, or the iteration meets a scene that is not valid.
     InputError
         If the table has no time, an unknown column or one column twice, or no more measured numbers than
-        free ones; if a measured number is not finite; if a free number is given twice or is of the start; if
-        a motion that is tried ends early; and for the reasons of ``sensitivities``.
+        free ones; if a measured number is not finite; if an angle loses full turns; if a free number is given
+        twice or is of the start; if a motion that is tried ends early; and for the reasons of
+        ``sensitivities``.
     """
     from scipy.optimize import least_squares
 
@@ -136,6 +139,7 @@ def fit(
     refuse_not_finite(chosen_columns := {name: columns[name] for name in used}, "measured")
     problem = _Problem(scene, times, chosen_columns, free, limits or Limits(rtol=FIT_RTOL))
     begin, lowest = problem.numbers.start / problem.sizes, problem.numbers.lowest
+    problem.refuse_wrapped(begin)
     tolerances = {name: FIT_TOLERANCE for name in ("ftol", "xtol", "gtol")}
     found = least_squares(problem.residuals, begin, problem.jacobian, bounds=(lowest, np.inf), **tolerances)
     return replace(problem.solution(found.x, found.status > 0), left_out=(*left_out,))
@@ -168,6 +172,7 @@ class _Problem:
     ):
         self.numbers, self.free, self.limits = FreeNumbers(scene, "free", free), tuple(free), limits
         self.times, self.measured, self.sizes = times, measured, self.numbers.sizes
+        self.given = np.array([*measured.values()]).T
         if (count := times.size * len(measured)) <= len(free):
             raise InputError(
                 f"measured: has {count} numbers in columns with derivatives, and {len(free)} free ones "
@@ -189,10 +194,16 @@ class _Problem:
                 values = ", ".join(f"{name} = {x:.6g}" for name, x in self.numbers.values(z).items())
                 reason = motion.message or "it passes a singular position"
                 raise InputError(f"fit: the motion with {values} has no derivatives to the end: {reason}")
-            table = motion.columns(*outputs)
-            off = np.array([table[name] - values for name, values in self.measured.items()]).T
+            table, given = motion.columns(*outputs), self.given
+            found = np.array([table[name] for name in self.measured]).T
+            off = found - nearest_signs([*self.measured], given, found) * given
             self._last = z.tobytes(), off, derivatives
         return self._last[1:]
+
+    def refuse_wrapped(self, z: np.ndarray) -> None:
+        """Raise InputError for a measured column of angles that loses full turns, by the motion with numbers
+        z."""
+        refuse_wrapped([*self.measured], self.given, self._at(z)[0] + self.given, self.times, "measured")
 
     def residuals(self, z: np.ndarray) -> np.ndarray:
         """Return the scaled residuals (k c,)."""
@@ -203,6 +214,22 @@ class _Problem:
         scaled = self._at(z)[1] / self.scales[:, None] * self.sizes
         return np.asarray(scaled.reshape(-1, len(self.free)))
 
+    def _covariance(self, residuals: np.ndarray, inverse: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Return the covariance (p, p) of the numbers z over their sizes, by the variance of each column's
+        residuals; ``inverse`` (p, p) is the inverse of JᵀJ in the determined directions.
+
+        The residuals of a column lose tr(J_c (JᵀJ)⁻¹ J_cᵀ) degrees of freedom to the numbers. Where less than
+        FEWEST_FREE are left, the residuals of all columns give the variance.
+        """
+        count = len(self.measured)
+        by_column = self.jacobian(z).reshape(self.times.size, count, -1)
+        squares = np.einsum("kcp,kcq->cpq", by_column, by_column)
+        scatter = (residuals.reshape(-1, count) ** 2).sum(axis=0)
+        free = self.times.size - np.einsum("pq,cqp->c", inverse, squares)
+        own = scatter / np.maximum(free, FEWEST_FREE)
+        variance = np.where(free >= FEWEST_FREE, own, scatter.sum() / free.sum())
+        return np.asarray(inverse @ np.tensordot(variance, squares, 1) @ inverse)
+
     def solution(self, z: np.ndarray, converged: bool) -> FitResult:
         """Return the fit with numbers z (p,), over their sizes."""
         residuals, off = self.residuals(z), self._at(z)[0]
@@ -210,8 +237,7 @@ class _Problem:
         directions = SingularDirections.of(self.jacobian(z), NO_INFLUENCE * influence)
         values, right, known = directions
         undetermined = directions.undetermined(self.free)
-        variance = residuals @ residuals / (residuals.size - known.sum())
-        covariance = variance * (right[known].T / values[known] ** 2) @ right[known]
+        covariance = self._covariance(residuals, (right[known].T / values[known] ** 2) @ right[known], z)
         lost = [any(name in combination for combination in undetermined) for name in self.free]
         deviation = np.where(lost, np.nan, np.sqrt(np.diag(covariance)))
         with np.errstate(invalid="ignore"):

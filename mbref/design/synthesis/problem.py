@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbref.design.derivatives.free_numbers import FreeNumbers
+from mbref.design.derivatives.given_values import nearest_signs
 from mbref.design.derivatives.numbers_of_scene import AccurateStencils
 from mbref.design.derivatives.sensitivities import motion_and_derivatives
 from mbref.design.synthesis.goals import Goal
@@ -77,7 +78,13 @@ class SynthesisProblem:
         found = self.values_at(z)
         if found is None:
             return np.full(self.given.sum(), np.nan)
-        return np.asarray(((found - self.goal.wanted) / self.scales)[self.given])
+        return np.asarray((self.off(found) / self.scales)[self.given])
+
+    def off(self, found: np.ndarray) -> np.ndarray:
+        """Return the differences (k, c) of values (k, c) from the goal; a quaternion and its opposite are one
+        orientation."""
+        goal = self.goal
+        return np.asarray(found - nearest_signs(goal.columns, goal.wanted, found) * goal.wanted)
 
     def jacobian(self, z: np.ndarray) -> np.ndarray:
         """Return the derivatives (r, variables) of the residuals; raises InputError where they do not

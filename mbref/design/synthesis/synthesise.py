@@ -230,4 +230,4 @@ class _Search:
     def _off(self, z: np.ndarray | None, goal: Goal) -> np.ndarray:
         """Return the differences (k, c) from the goal, NaN if there is no motion."""
         found = None if z is None else self.problem.values_at(z)
-        return np.full(goal.wanted.shape, np.nan) if found is None else found - goal.wanted
+        return np.full(goal.wanted.shape, np.nan) if found is None else self.problem.off(found)

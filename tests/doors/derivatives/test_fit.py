@@ -5,8 +5,11 @@ import pytest
 
 import mbref
 from mbref.cli import main
+from mbref.scene import Scene
 from tests.doors.derivatives.test_sensitivities import pendulum
 from tests.helpers.changed_scenes import in_other_units
+from tests.helpers.coupled_mechanisms import body
+from tests.helpers.parts import slide
 from tests.helpers.short_motions import MOTIONS
 
 NOISE = 1e-3  # rad, standard deviation of the errors of a measured angle
@@ -63,6 +66,46 @@ def test_fit_of_a_tiny_pendulum_finds_its_pivot_and_gravity():
     assert not found.undetermined
     for number, value in true.items():
         assert found.numbers[number] == pytest.approx(value, rel=1e-5)
+
+
+def test_standard_error_of_a_number_is_by_the_scatter_of_the_columns_that_determine_it():
+    """Forces F push two carts: x = F g with g = t²/(2 m). The regression of each column alone has the
+    standard error √(Σ r²/(k - 1)/Σ g²); one column is measured 1000 times as accurately as the other."""
+    times, random, masses = np.linspace(0.05, 1.0, 20), np.random.default_rng(0), {"A": 2.0, "B": 3.0}
+    scene = Scene(
+        name="carts",
+        body=[body(name, mass, [0.1] * 3, (mass, 0.0, 0.0)) for name, mass in masses.items()],
+        joint=[slide(name, "ground", name, (mass, 0.0, 0.0)) for name, mass in masses.items()],
+        load=[{"type": "joint_force", "joint": name, "force": 4.0} for name in masses],
+    )
+    columns, true = {"time": times}, []
+    for (name, mass), noise in zip(masses.items(), (1e-4, 0.1), strict=True):
+        g = times**2 / (2.0 * mass)
+        columns[f"{name}.displacement"] = x = 4.0 * g + random.normal(scale=noise, size=times.size)
+        rest = x - g * (g @ x) / (g @ g)
+        true.append(np.sqrt(rest @ rest / (times.size - 1) / (g @ g)))
+    found = mbref.fit(scene, columns, ["load[0].force", "load[1].force"])
+    np.testing.assert_allclose([*found.errors.values()], true, rtol=1e-6)
+
+
+def test_opposite_quaternions_are_one_measured_orientation():
+    """The measured orientation of the pendulum has w ≤ 0, as another tool may write it, mbref's has w > 0."""
+    times = np.array([0.1, 0.2, 0.3])
+    columns = mbref.simulate(pendulum(), times=times).columns("bob.orientation.w", "bob.orientation.z")
+    measured = {name: values if name == "time" else -values for name, values in columns.items()}
+    found = mbref.fit(pendulum().with_("body[bob].mass", 1.5), measured, ["body[bob].mass"])
+    assert found.numbers["body[bob].mass"] == pytest.approx(1.3, rel=1e-6)
+
+
+def test_angle_that_loses_full_turns_is_refused_with_its_samples():
+    """The pendulum turns by 4 rad in 0.4 s, which a table between -π and π shows as 4 - 2 π = -2.28 rad."""
+    spinning = (
+        pendulum().with_("gravity", (0.0, 0.0, 0.0)).with_("body[bob].angular_velocity", (0.0, 0.0, 10.0))
+    )
+    times = np.array([0.1, 0.2, 0.3, 0.4])
+    measured = {"time": times, "A.angle": np.array([1.0, 2.0, 3.0, 4.0 - 2.0 * np.pi])}
+    with pytest.raises(mbref.InputError, match=r"A\.angle changes by -5\.283 rad from t = 0\.3 to 0\.4 s"):
+        mbref.fit(spinning, measured, ["body[bob].mass"])
 
 
 def test_table_with_units_in_its_names_is_refused_with_a_column(tmp_path):
