@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -120,19 +121,25 @@ def _numbers(words: Sequence[str]) -> tuple[list[str], dict[str, tuple[float, fl
     """Return the numbers that may change, and the bounds of those that have them."""
     let, bounds = [], {}
     for word in words:
-        label, *limits = word.split()
-        try:
-            given = [float(limit) for limit in limits]
-        except ValueError:
-            given = [0.0]
-        if len(given) not in (0, 2):
+        parts = word.split()
+        count = len([*itertools.takewhile(_is_limit, reversed(parts))])
+        if count not in (0, 2) or count == len(parts):
             raise InputError(
                 f"--let: must be a number, or one with two bounds: 'joint[B].anchor.x 0.5 2', got {word!r}"
             )
+        label, *given = word.rsplit(maxsplit=count) if count else [word]
         let.append(label)
         if given:
-            bounds[label] = given[0], given[1]
+            bounds[label] = float(given[0]), float(given[1])
     return let, bounds
+
+
+def _is_limit(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def _show(found: SynthesisResult, least: bool) -> None:

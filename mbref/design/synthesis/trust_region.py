@@ -48,8 +48,13 @@ def least_residuals(
     r, jac, box = residuals(z), jacobian(z), FIRST_BOX
     for k in range(MOST_SEARCH_STEPS):
         lower, upper = np.maximum(bounds[0] - z, -box), np.minimum(bounds[1] - z, box)
+        size = residual_size(r, peak)
+        if size == 0.0:
+            return SearchEnd(z, r, True)
         step = (_peak_step if peak else _squares_step)(r, jac, lower, upper)
-        size, length = residual_size(r, peak), np.abs(step).max()
+        if step is None:
+            return SearchEnd(z, r, False)
+        length = np.abs(step).max()
         predicted = size - residual_size(r + jac @ step, peak)
         if length <= SMALLEST_BOX or predicted <= ROUNDING * max(size, 1.0):
             return SearchEnd(z, r, True)
@@ -77,8 +82,9 @@ def _squares_step(r: np.ndarray, jac: np.ndarray, lower: np.ndarray, upper: np.n
     return np.clip(step, lower, upper)
 
 
-def _peak_step(r: np.ndarray, jac: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Solve for step and s: least s with |r + J step| ≤ s, in units of the largest residual and the box."""
+def _peak_step(r: np.ndarray, jac: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray | None:
+    """Solve for step and s: least s with |r + J step| ≤ s, in units of the largest residual and the box;
+    None if SciPy finds no solution."""
     size, box = np.abs(r).max(), max(np.abs(lower).max(), np.abs(upper).max())
     rows, ones = jac * box / size, np.ones((len(r), 1))
     found = linprog(
@@ -88,5 +94,4 @@ def _peak_step(r: np.ndarray, jac: np.ndarray, lower: np.ndarray, upper: np.ndar
         bounds=[*zip(lower / box, upper / box, strict=True), (0.0, None)],
         options={"primal_feasibility_tolerance": LP_TOLERANCE, "dual_feasibility_tolerance": LP_TOLERANCE},
     )
-    step = found.x[:-1] * box if found.x is not None else np.zeros(len(lower))
-    return np.clip(step, lower, upper)
+    return None if found.x is None else np.clip(found.x[:-1] * box, lower, upper)

@@ -238,6 +238,23 @@ def test_command_writes_the_scene_and_says_that_points_are_not_reached(tmp_path,
     np.testing.assert_allclose([row[0] for row in record["residuals"]], [-0.05, -0.05], rtol=0, atol=FOUND)
 
 
+def test_command_takes_a_number_of_a_body_whose_name_has_blanks(tmp_path, capsys):
+    """Names of bodies may have blanks, and two bounds follow the path."""
+    scene = arm().to_dict()
+    scene["body"][0]["name"] = scene["joint"][0]["bodies"][1] = "first arm"
+    Scene(**scene).save(tmp_path / "arm.toml")
+    (tmp_path / "points.csv").write_text("time,first arm.position.x\n0.0,1.0\n")
+    let = ["--let", "body[first arm].position.x 0.5 1.1", "--follow", str(tmp_path / "points.csv")]
+    assert main(["design", str(tmp_path / "arm.toml"), *let, "--starts", "1"]) == 0
+    assert "body[first arm].position.x = 1\n" in capsys.readouterr().out
+
+
+def test_points_of_the_scenes_own_motion_are_reached_at_once_by_their_peak():
+    """All residuals are zero at the start, so that no step has a unit."""
+    found = mbref.synthesise(arm(), ARM, follow={"time": [0.0], "arm.position.z": [0.0]}, peak=True, starts=1)
+    assert found.reached and found.converged
+
+
 @pytest.mark.parametrize(
     ("request_", "message"),
     [
