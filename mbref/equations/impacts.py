@@ -15,6 +15,7 @@ import numpy as np
 from mbref.equations.initial_state import consistent_start, position_weights
 from mbref.equations.joint_reactions import least_reactions, open_dimensions, vanishing_at
 from mbref.equations.model import Model
+from mbref.equations.offsets import assembled
 from mbref.equations.units import row_lengths
 from mbref.scene import Driver, Scene, SceneError
 
@@ -67,7 +68,7 @@ def impact(before: Scene, after: Scene) -> Impact:
 def is_locked(scene: Scene, joint: str) -> bool:
     """Return whether the constraints of a scene lock the coordinate of a joint that a driver could prescribe,
     at the scene's poses: its row is a combination of the other rows."""
-    model = Model(scene.with_(driver=[*scene.driver, Driver(joint=joint, polynomial=(0.0,))]))
+    model = Model(assembled(scene).with_(driver=[*scene.driver, Driver(joint=joint, polynomial=(0.0,))]))
     root, rows = 1 / np.sqrt(position_weights(model)), model.terms(0.0, model.start()).jacobian
     unit = rows * root / row_lengths(rows * root)[:, None]
     own = model.structure.row[model.structure.driver == len(scene.driver)][0]

@@ -9,6 +9,7 @@ import numpy as np
 
 from mbref.equations.joint_reactions import SHARE, open_changes
 from mbref.equations.model import Model
+from mbref.equations.offsets import assembled
 from mbref.motions.motion import Motion
 from mbref.motions.pieces import constraint_parts
 from mbref.motions.trajectory import Trajectory
@@ -43,7 +44,7 @@ class Conditions:
         motion = self._run(held, np.zeros(1))
         if not len(motion.times):
             return ()
-        model = Model(held)
+        model = Model(assembled(held))
         q, blocks = model.start(), model.terms(0.0, model.start()).blocks
         changes = list(open_changes(model, q.reshape(1, model.nb, 7), blocks[None]))
         model.release()

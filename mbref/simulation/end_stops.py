@@ -15,6 +15,7 @@ import numpy as np
 
 from mbref.equations.impacts import Impact, impact, is_locked
 from mbref.equations.model import Model
+from mbref.equations.offsets import assembled
 from mbref.motions.driving_forces import coordinate_acceleration
 from mbref.motions.joint_motion import along, joint_motion
 from mbref.motions.motion import Motion
@@ -69,7 +70,7 @@ class EndStops:
     def __init__(self, scene: Scene, run: Callable[[Scene, np.ndarray], Motion], end: float):
         self.scene, self._run, self._end = scene, run, end
         self.sides = [*_sides(scene)]
-        model = Model(first_piece(scene))
+        model = Model(assembled(first_piece(scene)))
         self.length = float(model.length)
         model.release()
 

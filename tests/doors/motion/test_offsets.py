@@ -144,6 +144,24 @@ def test_every_scene_of_an_ensemble_starts_at_its_own_offset():
         assert np.array_equal(together[k].orientation, alone.orientation)
 
 
+@pytest.mark.parametrize("cause", ["stop", "when", "active"])
+def test_wheels_with_an_offset_are_held_where_their_angle_counts_from_the_files_poses(cause):
+    """2 N m turn the pinion by 25 t²/2 from its assembled angle a, so that it is at a + 2 rad at 0.4 s, where
+    an end stop without restitution, a weld by its condition or a weld by its interval holds it."""
+    scene = shifted(gear_pair, "teeth", 7.0)
+    a = mbref.simulate(scene, times=[0.0]).joint("A").angle[0]
+    weld = {"name": "weld", "type": "fixed", "bodies": ["ground", "wheel"], "anchor": [0.0, 0.0, 0.0]}
+    found = scene.to_dict()
+    if cause == "stop":
+        found["joint"][0]["stop"] = {"upper": a + 2.0, "restitution": 0.0}
+    else:
+        begins = {"when": {"joint": "A", "reaches": a + 2.0}, "active": [[0.4, 9.0]]}
+        found["joint"] = [*found["joint"], {**weld, cause: begins[cause]}]
+    motion = mbref.simulate(Scene(**found), times=[0.2, 0.6, 1.0])
+    assert [event.time for event in motion.events] == pytest.approx([0.4], abs=CLOSED_FORM)
+    np.testing.assert_allclose(motion.joint("A").angle, [a + 0.5, a + 2.0, a + 2.0], rtol=0, atol=1e-11)
+
+
 def test_drawing_shows_the_assembled_pose():
     """``at_rest`` is the motion of one sample that a drawing shows, ``still`` the drawing as SVG."""
     scene = shifted(rack, "teeth", 0.05)
