@@ -18,7 +18,7 @@ from crosscheck.judge.start import started
 from crosscheck.study.comparison import Collection, Notice, Wanted, collected
 from crosscheck.study.dead_positions import followed
 from crosscheck.study.fair_timing import force_differences, model_differences
-from crosscheck.study.grades import Judged, grade, judged
+from crosscheck.study.grades import Grade, Judged, judged
 from crosscheck.study.grid import TIME_LIMIT, Record
 from crosscheck.study.record_view import error, is_completed, public
 from crosscheck.study.search import selection
@@ -80,7 +80,8 @@ class Comparison:
         Keys: engine, family, settings, verdict, outcome, end time (s), error and the other metrics, CPU
         seconds of stepping, and steps.
         """
-        return [_row(r) for r in sorted(self.records, key=lambda r: (not is_completed(r), error(r)))]
+        ordered = sorted(self.records, key=lambda r: (not is_completed(r), error(r)))
+        return [_row(r, self.judged.grade(r)) for r in ordered]
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return ``rows`` as a pandas DataFrame.
@@ -254,12 +255,12 @@ def comparisons(found: Collection, paths: dict[str, str], reference_time: float)
     return compared
 
 
-def _row(record: Record) -> Row:
+def _row(record: Record, found: Grade) -> Row:
     return {
         "engine": record["engine"],
         "family": record["family"],
         "settings": record["asked"]["options"],
-        "verdict": str(grade(record)),
+        "verdict": str(found),
         "outcome": record["outcome"],
         "t_end": record["t_end"],
         **record["metrics"],

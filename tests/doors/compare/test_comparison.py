@@ -136,3 +136,10 @@ def test_two_engines_of_one_name_are_refused():
     """Records of both engines would be of one: runs of the other engine would be judged as its own."""
     with pytest.raises(RequestError, match="both have the name 'fake'"):
         crosscheck.compare(BLOCK, [f"{FAKES}:FAKE", f"{FAKES}:KEEPING"])
+
+
+def test_rows_of_an_engine_with_another_mechanism_are_unjudged():
+    """The engine's bodies start 1 mm aside: its runs are unjudged in Python, too, as in the printed table."""
+    found = crosscheck.compare(BLOCK, [FAKE, f"{FAKES}:ELSEWHERE"], families="plain", samples=3)
+    rows = [row["verdict"] for row in found.rows if row["engine"] == "elsewhere"]
+    assert set(rows) == {"unjudged"} and "elsewhere" in found.judged.differences
