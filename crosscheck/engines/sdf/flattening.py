@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 import xml.etree.ElementTree as ET
 
-from crosscheck.engines.sdf.frames import MODEL, WORLD
+from crosscheck.engines.sdf.frames import MODEL, NAMED, WORLD
 from mbref.scene import SceneError
 
 STATIC = "static"  # attribute of a link that does not move
@@ -24,7 +24,7 @@ def flattened(root: ET.Element) -> ET.Element:
     models = outside.findall("model")
     _refuse_parts(outside, "the world")
     flat = ET.Element("model", name="all")
-    is_alone = len(models) == 1 and outside.find("joint") is None
+    is_alone = len(models) == 1 and outside.find("joint") is None and not _names(outside) & _names(models[0])
     writer = _Writer(flat)
     for element in outside:
         if element.tag in ("joint", "frame"):
@@ -32,6 +32,12 @@ def flattened(root: ET.Element) -> ET.Element:
     for model in models:
         writer.add_model(model, "", WORLD, is_alone)
     return flat
+
+
+def _names(element: ET.Element) -> set[str | None]:
+    """Return the names of the links, joints, frames and models in a model, or of the frames of a world."""
+    tags = ("frame",) if element.tag == "world" else (*NAMED, "model")
+    return {part.get("name") for tag in tags for part in element.findall(tag)}
 
 
 def _refuse_parts(element: ET.Element, where: str) -> None:
@@ -110,9 +116,11 @@ class _Writer:
         target.append(pose)
 
     def _axis(self, axis: ET.Element | None, prefix: str, frame: str) -> None:
-        xyz = axis.find("xyz") if axis is not None else None
-        if axis is None or xyz is None:
+        if axis is None:
             return
+        if (xyz := axis.find("xyz")) is None:
+            xyz = ET.SubElement(axis, "xyz")
+            xyz.text = "0 0 1"  # the default of the format
         if given := xyz.get("expressed_in"):
             xyz.set("expressed_in", _full(given, prefix, frame))
         elif axis.get(IN_MODEL):

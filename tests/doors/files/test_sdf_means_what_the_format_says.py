@@ -110,6 +110,32 @@ def test_an_offset_of_a_mimic_joint_that_is_only_rounding_is_exactly_zero(files,
     assert scene.coupling[0].offset == 0.0
 
 
+def test_a_mimic_of_an_axis_without_xyz_names_a_joint_of_its_model(files):
+    """The axis has the format's default, z, here in the frame of the model up to version 1.4. The world has
+    two models, so that names begin with the model's."""
+    follow = "<mimic joint='lead'><multiplier>3</multiplier></mimic>"
+    joints = [
+        f"<joint name='{name}' type='revolute'><parent>world</parent><child>{child}</child>{axis}</joint>"
+        for name, child, axis in (("lead", "a", ""), ("follow", "b", f"<axis>{follow}</axis>"))
+    ]
+    links = link("a"), link("b", f"1 0 0 {math.pi / 2!r} 0 0")
+    models = f"<model name='m'>{''.join((*links, *joints))}</model><model name='n'>{link('c')}</model>"
+    text = f"<sdf version='1.4'><world name='w'>{models}</world></sdf>"
+    scene, _ = files.scene(text, "two.sdf")
+    assert scene.coupling[0].joints == ("m::lead", "m::follow") and scene.coupling[0].ratio == 3.0
+    assert scene.joint_named("m::follow").axis == pytest.approx((0.0, 0.0, 1.0), abs=1e-14)
+
+
+def test_a_model_may_stand_in_a_frame_of_the_world_with_the_name_of_its_link(files):
+    """Frames of the world and links of a model are different scopes of names."""
+    frame = "<frame name='base'><pose>1 2 3 0 0 0</pose></frame>"
+    inside = link("base") + joint("pivot", "revolute", "world", "base")
+    model = f"<model name='m'><pose relative_to='base'>0 0 1 0 0 0</pose>{inside}</model>"
+    text = f"<sdf version='1.9'><world name='w'>{frame}{model}</world></sdf>"
+    scene, _ = files.scene(text, "placed.sdf")
+    assert [body.position for body in scene.body] == [(1.0, 2.0, 4.0)]
+
+
 def inertia(xx: float, yy: float, zz: float) -> str:
     entries = "".join(f"<i{k}{k}>{v}</i{k}{k}>" for k, v in zip("xyz", (xx, yy, zz), strict=True))
     return f"<inertial><mass>1</mass><inertia>{entries}</inertia></inertial>"
