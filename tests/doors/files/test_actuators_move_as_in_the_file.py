@@ -156,3 +156,13 @@ def test_a_number_that_is_the_name_of_a_keyframe_means_that_keyframe(files):
     text = model_of(["<motor joint='JOINT'/>"], "name='0' qpos='0.5'")
     scene, _ = files.scene(text, "a.xml", "--keyframe", "0")
     assert scene.body[0].orientation[2] == pytest.approx(np.sin(0.25), rel=1e-12)  # rounding
+
+
+def test_an_actuator_whose_range_of_controls_excludes_0_acts_without_a_keyframe(files):
+    """MuJoCo clips the control 0 into the range 2 … 3; the joint's own range of forces then clips 2 N m."""
+    acting = "<motor joint='JOINT' ctrlrange='2 3'/>", "<position joint='JOINT' ctrlrange='1 2' kp='9'/>"
+    text = model_of([*acting])
+    text = text.replace("name='j0'", "name='j0' actuatorfrcrange='-1.5 1.5'")
+    scene, _ = files.scene(text, "clipped.xml")
+    theirs = accelerations(text, -1)
+    assert of_scene(scene) == pytest.approx(theirs, abs=ROUNDED * np.abs(theirs).max())

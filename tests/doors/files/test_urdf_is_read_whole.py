@@ -134,3 +134,32 @@ def test_limits_without_a_range_are_named(files):
     )
     _, out = files.scene(robot(free, *CRANKS[1:]), "r.urdf")
     assert "limits of joints 'ja': lower and upper are 0 or missing; the joints are free" in out
+
+
+def limited(lower: str, upper: str) -> str:
+    """A robot whose crank begins 1.2 rad above x, and falls to larger angles about y, with a limit."""
+    limit = f'<limit {lower} {upper} effort="1" velocity="1"/>'
+    first = hinge("ja", "base", "a", "0 0 0", -1.2, more=limit).replace("continuous", "revolute")
+    return robot(first, *CRANKS[1:])
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "says"),
+    [
+        ('lower="0.3"', 'upper="0.3"', "limit of joint 'ja', whose ends are both 0.3"),
+        ('lower="1"', 'upper="-1"', "limit of joint 'ja', whose lower end 1 is above its upper end -1"),
+        ('lower="0.5"', "", "limit of joint 'ja', whose lower end 0.5 is above its upper end 0"),
+        ('lower="-1"', "", "limit of joint 'ja', which acts at the start"),
+    ],
+)
+def test_limits_that_the_file_s_motion_cannot_keep_are_refused_or_left_out(files, lower, upper, says):
+    """A missing end is 0, the format's default. The joint is at 0, and falls to larger angles: against an
+    upper end 0. MuJoCo reads none of these limits."""
+    assert says in files.refusal(limited(lower, upper), "r.urdf")
+    _, out = files.scene(limited(lower, upper), "r.urdf", "--without", "limits")
+    assert says in out
+
+
+def test_a_limit_with_one_end_that_does_not_act_is_left_out_with_a_remark(files):
+    """The crank falls away from 0, the lower end."""
+    assert "1 limit of a joint" in files.scene(limited("", 'upper="1"'), "r.urdf")[1]

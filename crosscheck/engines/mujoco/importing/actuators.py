@@ -85,7 +85,7 @@ class Actuators:
         group = int(model.actuator_group[a])
         if 0 <= group < 31 and int(model.opt.disableactuator) >> group & 1:
             return False
-        inputs = [*self.control[self._controls(a)], *self.activation[self._activations(a)]]
+        inputs = [*self._clipped(a), *self.activation[self._activations(a)]]
         if (bias := int(model.actuator_biastype[a])) == int(self.mujoco.mjtBias.mjBIAS_AFFINE):
             return bool(np.any(model.actuator_biasprm[a, :3]) or np.any(inputs))
         return bias != int(self.mujoco.mjtBias.mjBIAS_NONE) or bool(np.any(inputs))
@@ -93,6 +93,14 @@ class Actuators:
     def _controls(self, a: int) -> slice:
         first = int(self.model.actuator_ctrladr[a])
         return slice(first, first + int(self.model.actuator_ctrlnum[a]))
+
+    def _clipped(self, a: int) -> np.ndarray:
+        """Return the controls of an actuator within their range, which may exclude 0."""
+        controls, model = self.control[self._controls(a)], self.model
+        is_free = bool(model.opt.disableflags & self.mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL)
+        if is_free or not model.actuator_ctrllimited[a]:
+            return controls
+        return np.clip(controls, *model.actuator_ctrlrange[a])
 
     def _activations(self, a: int) -> slice:
         first = int(self.model.actuator_actadr[a])
@@ -171,13 +179,10 @@ class Actuators:
     def _input(self, a: int) -> float | None:
         """Return the constant input of an actuator, its control or its activation; None if it changes."""
         model, kinds = self.model, self.mujoco.mjtDyn
-        controls, activations = self.control[self._controls(a)], self.activation[self._activations(a)]
+        controls, activations = self._clipped(a), self.activation[self._activations(a)]
         if len(controls) != 1 or len(activations) > 1 or (model.actuator_delay[a] and np.any(controls)):
             return None
         control = float(controls[0])
-        is_free = bool(model.opt.disableflags & self.mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL)
-        if model.actuator_ctrllimited[a] and not is_free:
-            control = float(np.clip(control, *model.actuator_ctrlrange[a]))
         if model.actuator_dyntype[a] == kinds.mjDYN_NONE:
             return control
         steady = {int(kinds.mjDYN_INTEGRATOR): 0.0}

@@ -137,7 +137,7 @@ class _Reader:
         self.parts += left_out.of_model(model, self.kept)
         self.parts += limits.acting(mujoco, model, self.poses.data, self.actuators)
         if self.text is not None:
-            self.parts += urdf.couplings(self.text.root)
+            self.parts += [*urdf.couplings(self.text.root), *urdf.impossible_limits(self.text.root)]
             self.unread = tuple(urdf.unread(self.text.root))
         self.notes += unclosed(self.groups, self.poses.data, closures, self.poses.extent)
 

@@ -32,6 +32,7 @@ FOR_MUJOCO = {  # inner elements that MuJoCo is given
     "joint": ("origin", "parent", "child", "axis", "dynamics", "limit"),
 }
 CLOSURES = ("constraint", "loop_joint")  # loops that name parent and child, each with an origin
+ENDS = ("lower", "upper")
 LEAST = 1e-12  # kg and kg m²; MuJoCo refuses moving bodies with smaller values
 BodyOf = Callable[[str], int]
 
@@ -71,6 +72,8 @@ def prepared(text: str | bytes, hold: Sequence[str] = (), where: str = "URDF") -
     for parent in (part for tag in FOR_MUJOCO for part in root.iter(tag)):
         for child in [c for c in parent if c.tag not in FOR_MUJOCO[parent.tag]]:
             parent.remove(child)
+    for joint in root.iter("joint"):
+        _complete_limit(joint)
     added = {str(link.get("name")): _enough(link) for link in root.iter("link")}
     options = ET.SubElement(ET.SubElement(root, "mujoco"), "compiler")
     options.attrib.update(fusestatic="false", discardvisual="true", balanceinertia="false")
@@ -152,10 +155,40 @@ def unread(root: ET.Element) -> Iterator[str]:
         yield f"limits of joints {', '.join(names)}: lower and upper are 0 or missing; the joints are free"
 
 
+def _complete_limit(joint: ET.Element) -> None:
+    """Write the format's default, 0, for one missing end of a limit: MuJoCo then reads no limit."""
+    limit = joint.find("limit")
+    if limit is not None and any(limit.get(end) for end in ENDS):
+        for end in ENDS:
+            limit.set(end, limit.get(end, "0"))
+
+
+def impossible_limits(root: ET.Element) -> Iterator[Part]:
+    """Return limits without a range between their ends, of which MuJoCo reads none."""
+    for joint in root.iter("joint"):
+        limit, name = joint.find("limit"), joint.get("name")
+        if joint.get("type") not in ("revolute", "prismatic") or limit is None or _has_no_range(joint):
+            continue
+        lower, upper = (_number(limit.get(end, "0")) for end in ENDS)
+        if lower == upper:
+            yield Part("limits", f"limit of joint {name!r}, whose ends are both {lower:g}")
+        elif lower > upper:
+            ends = f"lower end {lower:g} is above its upper end {upper:g}"
+            yield Part("limits", f"limit of joint {name!r}, whose {ends}")
+
+
+def _number(text: str) -> float:
+    """Return a number, NaN for other text, about which MuJoCo has a message."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
 def _has_no_range(joint: ET.Element) -> bool:
     """Return whether a joint has limits whose ends are 0 or missing."""
     limit = joint.find("limit")
-    return limit is not None and not any(limit.get(end, "0").strip(" +-.0") for end in ("lower", "upper"))
+    return limit is not None and not any(limit.get(end, "0").strip(" +-.0") for end in ENDS)
 
 
 def loops(root: ET.Element, body_of: BodyOf, data: Any) -> Iterator[Closure]:
