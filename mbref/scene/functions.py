@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
-from pydantic import BeforeValidator, ValidationInfo, field_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 
 from mbref.scene.fields import (
     Angle,
@@ -30,7 +30,8 @@ from mbref.scene.fields import (
 )
 
 MOST_PERIODS = 100_000  # of a periodic table
-CLOSED_TABLE = 1e-9  # difference of the first and last value of a period / largest value that is rounding
+# difference of two values of a period / largest value, or of times / length of the table, that is rounding
+CLOSED_TABLE = 1e-9
 FEWEST_ROWS = 4  # least number of rows of a table; four rows determine a cubic polynomial
 
 Row = tuple[Annotated[Real, unit_of("time")], Measure]
@@ -59,12 +60,14 @@ class TimeFunction(SceneEntry):
     """polynomial + sine + table; each part is optional.
 
     ``table`` has rows (time in s, value), times increasing. A ``periodic`` table begins and ends with one
-    value; a scene repeats its rows up to the duration.
+    value; a scene repeats its rows up to the duration, and states then in ``period_rows`` how many rows one
+    period has, without the last one.
     """
 
     periodic: bool = False
     sine: Sine | None = None
     table: Table | None = None
+    period_rows: Annotated[int, Field(ge=FEWEST_ROWS - 1)] | None = None
 
     @field_validator("table")
     @classmethod
@@ -80,15 +83,31 @@ class TimeFunction(SceneEntry):
                 )
         return _closed(table) if info.data.get("periodic") else table
 
+    @field_validator("period_rows")
+    @classmethod
+    def _table_has_equal_periods(cls, count: int | None, info: ValidationInfo) -> int | None:
+        if count is None or not (table := info.data.get("table")):
+            return count
+        if (len(table) - 1) % count:
+            raise ValueError(f"must divide the {len(table) - 1} rows before the last one, got {count}")
+        (first, _), (end, _), (last, _) = table[0], table[count], table[-1]
+        size = max(abs(x) for _, x in table)
+        for k, ((t, x), (later, other)) in enumerate(zip(table, table[count:], strict=False)):
+            off = abs(other - x) > CLOSED_TABLE * size
+            if off or abs(later - t - (end - first)) > CLOSED_TABLE * (last - first):
+                raise ValueError(f"is {count}, but rows {k} and {k + count} of the table differ")
+        return count
+
     def repeated(self, until: float) -> Self:
         """Return the function with the rows of a periodic table repeated up to a time (s)."""
         if not (self.periodic and self.table) or self.table[-1][0] >= until:
             return self
-        (first, _), *_, (last, _) = self.table
+        period = self.period_rows or len(self.table) - 1
+        (first, _), *_, (last, value) = table = self.table[: period + 1]
         count = math.ceil((until - first) / (last - first))
-        rows = [(t + k * (last - first), x) for k in range(count) for t, x in self.table[:-1]]
-        end = first + count * (last - first), self.table[-1][1]
-        return self.model_copy(update={"table": (*rows, end)})
+        rows = [(t + k * (last - first), x) for k in range(count) for t, x in table[:-1]]
+        end = first + count * (last - first), value
+        return self.model_copy(update={"table": (*rows, end), "period_rows": period})
 
     @property
     def coefficients(self) -> tuple[float, ...]:

@@ -42,7 +42,34 @@ def _replaced(value: Any, steps: Sequence[str], change: Callable[[Any], Any], pa
     fields = _fields_of(value)
     if step not in fields:
         raise SceneError([f"{path}: the scene has no {step!r} there{meant(step, fields)}"])
+    if step == "table" and not rest and fields.get("period_rows"):
+        return {**fields, step: change(fields[step]), "period_rows": None}  # another table has another period
+    if step == "table" and rest and fields.get("periodic"):
+        period = fields.get("period_rows") or len(fields[step]) - 1
+        return {**fields, step: _in_all_periods(fields[step], period, rest, change, path)}
     return {**fields, step: _replaced(fields[step], rest, change, path)}
+
+
+def _in_all_periods(
+    table: tuple[Any, ...], period: int, steps: Sequence[str], change: Callable[[Any], Any], path: str
+) -> tuple[Any, ...]:
+    """Return the rows [time, value] of a periodic table with one row, or a number in it, changed in all
+    periods of ``period`` rows, and at both ends of a period."""
+    place = _place(table, steps[0], path)
+    changed = _replaced(table[place], steps[1:], change, path)
+    if not isinstance(changed, tuple):  # a mark, or a row that is given as a list
+        return tuple(changed if k == place else row for k, row in enumerate(table))
+    time, value = changed
+    return tuple(
+        (_later(time, row[0], table[place][0]), value) if (k - place) % period == 0 else row
+        for k, row in enumerate(table)
+    )
+
+
+def _later(time: Any, own: float, before: float) -> Any:
+    """Return the changed time (s) of a row, moved from the time before of the changed row to its own; a time
+    that is no number stays."""
+    return time + (own - before) if isinstance(time, int | float) else time
 
 
 def _fields_of(value: Any) -> Mapping[str, Any]:

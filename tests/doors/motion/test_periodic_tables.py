@@ -85,6 +85,23 @@ def test_run_notes_the_error_of_interpolation_and_proposes_a_periodic_table(peri
     assert ("or periodic = true" in said) == (not periodic)
 
 
+@pytest.mark.parametrize("duration", [0.3, 2.5])
+def test_number_of_a_periodic_table_changes_in_all_periods(duration, tmp_path):
+    """The angle of the driven wheel at 2.3 s by the value of the row at 0.4 s is the periodic spline through
+    one there and zeros, also of a scene whose rows were repeated and saved."""
+    driven(duration).save(tmp_path / "wheel.toml")
+    found = mbref.sensitivities(tmp_path / "wheel.toml", ["J.angle"], ["driver[J].table[3][1]"], [2.3])
+    unit = CubicSpline(TIMES, np.eye(len(TIMES))[3], bc_type="periodic")
+    assert found.values[0, 0, 0] == pytest.approx(unit(2.3 % PERIOD), abs=1e-12)
+
+
+def test_another_table_in_place_of_a_repeated_one_has_a_period_of_its_own():
+    """The new period of 1.6 s contains the old one and its negative."""
+    table = [*TABLE[:-1], *((t + PERIOD, -x) for t, x in TABLE)]
+    scene = driven().with_("driver[J].table", table)
+    assert mbref.simulate(scene, times=[1.2, 2.0]).joint("J").angle == pytest.approx([0.6, -0.6], abs=1e-12)
+
+
 @pytest.mark.parametrize(
     ("table", "says"),
     [
@@ -96,3 +113,11 @@ def test_run_notes_the_error_of_interpolation_and_proposes_a_periodic_table(peri
 def test_periodic_table_that_does_not_close_or_cover_the_motion_is_refused(table, says):
     with pytest.raises(SceneError, match=says):
         wheel().with_(driver=({"joint": "J", "table": table, "periodic": True},))
+
+
+def test_row_of_a_repeated_table_that_was_edited_in_one_period_is_refused():
+    """A file that mbref wrote has the rows of all periods."""
+    found = driven().to_dict()
+    found["driver"][0]["table"][9][1] = 0.7
+    with pytest.raises(SceneError, match="period_rows: is 6, but rows 3 and 9 of the table differ"):
+        mbref.Scene(**found)
