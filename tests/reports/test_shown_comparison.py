@@ -3,8 +3,6 @@
 import re
 from pathlib import Path
 
-import pytest
-
 from crosscheck.cli.comparison import Comparison
 from reports.pages.which_engine import REPORTS, judged
 from reports.stored import groups
@@ -15,22 +13,16 @@ HEADINGS = re.compile(
 )
 
 
-@pytest.fixture(scope="module")
-def printed() -> str:
-    """Return the output for the plane slider-crank of the reference report."""
+def test_extract_in_the_docs_has_the_printed_headings_in_order_and_the_printed_columns():
+    """Runs of the plane slider-crank in the reference report print seven headings, of which the first 12
+    letters are compared, and the line of columns from "engine, family" to "ratio"."""
     group = next(g for g in groups(REPORTS / "reference") if g.scene.name == "planar_slider_crank")
-    return str(Comparison(judged(group), "planar_slider_crank", None))
-
-
-def test_extract_in_the_docs_has_the_printed_headings_in_order(printed):
-    """The comparison of stored runs prints seven headings; their first 12 letters are compared."""
+    printed = str(Comparison(judged(group), "planar_slider_crank", None)).splitlines()
     _, extract, _ = re.split("<!-- /?compare -->", PAGE.read_text())
-    shown = [line for line in extract.splitlines() if HEADINGS.match(line)]
-    starts = [line[:12].strip() for line in printed.splitlines() if HEADINGS.match(line)]
-    assert len(shown) == 7 and [line[:12].strip() for line in shown] == starts
-
-
-def test_extract_in_the_docs_has_the_printed_columns(printed):
-    """The line of headings from "engine, family" to "ratio" is among the printed lines."""
+    shown, starts = (
+        [line[:12].strip() for line in lines if HEADINGS.match(line)]
+        for lines in (extract.splitlines(), printed)
+    )
+    assert len(shown) == 7 and shown == starts
     [columns] = re.findall(r"^ +engine, family .* ratio$", PAGE.read_text(), re.M)
-    assert columns.split() in [line.split() for line in printed.splitlines()]
+    assert columns.split() in [line.split() for line in printed]

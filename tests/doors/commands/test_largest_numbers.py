@@ -108,11 +108,19 @@ def test_duration_of_more_than_a_billion_seconds_is_refused_with_the_limit(comma
     assert f"{option}: must be" in (said := capsys.readouterr().err) and "at most 1e+09 s, got 1e+20" in said
 
 
-def test_closure_gap_longer_than_the_mechanism_is_refused_with_its_length(capsys):
+@pytest.mark.parametrize(
+    ("gap", "says"),
+    [
+        ("1km", "must be at most the mechanism's length, 0.707 m, got 1000 m"),
+        *((gap, "must be positive") for gap in ("0mm", "-1 mm")),
+        *(("3 parsec", "'parsec' is no unit of length"), ("wide", "must be a number")),
+    ],
+)
+def test_closure_gap_that_is_no_length_up_to_the_mechanisms_own_is_refused(capsys, gap, says):
     """The largest distance in the start pose of the four-bar, a rhombus of 0.5 m sides, is 0.5 √2 m."""
-    status, said = ended(capsys, "tune", "tests.helpers.still_engines:LOGGED", "four_bar", "--closure", "1km")
-    assert status == 2
-    assert "--closure: must be at most the mechanism's length, 0.707 m, got 1000 m" in said
+    engine = "tests.helpers.still_engines:LOGGED"
+    status, said = ended(capsys, "tune", engine, "four_bar", f"--closure={gap}")
+    assert status == 2 and "--closure: " in said and says in said, said
 
 
 def test_samples_that_would_fill_the_memory_are_refused_with_the_largest_number(tmp_path, capsys):

@@ -1,17 +1,15 @@
 """Scripts that prove findings: their number counts, and none outlives the command that runs it."""
 
-import os
-import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 from typing import Any
 
-import psutil
 import pytest
 
 from crosscheck.findings.finding import Finding, Status
+from tests.helpers.processes import PATIENCE, is_gone
 
 TEXTS: dict[str, Any] = dict.fromkeys(("name", "engine", "version", "does", "right", "cause"), "a")
 PARENT = """
@@ -19,7 +17,6 @@ from crosscheck.findings.finding import Finding
 Finding(**{texts!r}, package="numpy", script={script!r}).recheck()
 """
 SLEEPER = "import os, pathlib, time; pathlib.Path({path!r}).write_text(str(os.getpid())); time.sleep(600)"
-PATIENCE = 60.0  # s of waiting, on a loaded machine
 
 
 @pytest.mark.parametrize(
@@ -51,30 +48,12 @@ def test_proof_without_a_number_is_unclear_and_the_answer_has_the_reason(script:
     assert answer.status is Status.UNCLEAR and says in answer.words
 
 
-def wait_for(what: Any) -> Any:
-    """Return the first true result of a function within PATIENCE."""
-    end = time.monotonic() + PATIENCE
-    while not (found := what()) and time.monotonic() < end:
-        time.sleep(0.05)
-    return found
-
-
 def test_script_of_a_proof_ends_when_the_command_that_runs_it_is_killed(tmp_path: Path):
-    """The script writes its process number and sleeps 600 s. SIGKILL ends its parent; then the script's
-    process ends, too, within PATIENCE and so long before its sleep is over."""
-    pid_file = tmp_path / "number"
-    script = SLEEPER.format(path=str(pid_file))
-    parent = subprocess.Popen(
-        [sys.executable, "-c", PARENT.format(texts=TEXTS, script=script)], cwd=os.getcwd()
-    )
-    number = int(wait_for(lambda: pid_file.exists() and pid_file.read_text()))
-    parent.send_signal(signal.SIGKILL)
-    parent.wait()
-
-    def has_ended() -> bool:
-        try:
-            return psutil.Process(number).status() == psutil.STATUS_ZOMBIE
-        except psutil.NoSuchProcess:
-            return True
-
-    assert wait_for(has_ended)
+    """The script writes its process number and sleeps 600 s. SIGKILL ends its parent, and then the script."""
+    number, end = tmp_path / "number", time.monotonic() + PATIENCE
+    program = PARENT.format(texts=TEXTS, script=SLEEPER.format(path=str(number)))
+    with subprocess.Popen([sys.executable, "-c", program]) as parent:
+        while not (number.exists() and number.read_text()) and time.monotonic() < end:
+            time.sleep(0.05)
+        parent.kill()
+    assert is_gone(int(number.read_text()))

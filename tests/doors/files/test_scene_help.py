@@ -224,15 +224,11 @@ def test_text_that_is_no_length_is_refused_in_a_sentence(text, snapshot):
 
 
 def test_diagnose_prints_values_with_units_in_si(tmp_path, capsys):
-    """The first number of the template's first position is written in mm."""
-    path = tmp_path / "my.toml"
-    text = (Path(__file__).parents[3] / "mbref" / "templates" / "scene.toml").read_text()
-    assert "position = [" in text
-    start = text.index("position = [") + len("position = [")
-    number = text[start : text.index(",", start)]
-    path.write_text(text[:start] + f'"{1000 * float(number):g} mm"' + text[start + len(number) :])
-    assert main(["diagnose", str(path), "--start"]) == 0
-    assert f"{1000 * float(number):g} mm = {float(number):g} m" in capsys.readouterr().out
+    """The crank's position in the template, 0.1 m along x, is written in mm."""
+    (old,) = [line for line in template().splitlines() if line.startswith("position = [0.1,")]
+    (tmp_path / "my.toml").write_text(template().replace(old, old.replace("[0.1,", '["100 mm",')))
+    assert main(["diagnose", str(tmp_path / "my.toml"), "--start"]) == 0
+    assert "100 mm = 0.1 m" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("angle", "slips"), [("-800 deg", 0), (-69.0, 1)])

@@ -6,7 +6,7 @@ import pytest
 from crosscheck.conformance.mechanisms.hard import HARD
 from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.judge.arithmetic import EXTENDED
-from crosscheck.judge.reference.bound import differences
+from crosscheck.judge.reference.bound import bounds, differences
 from crosscheck.judge.reference.reference import judged, runs
 from crosscheck.judge.reference.start_velocities import least_squares, start_velocities
 from crosscheck.judge.reference.taylor import natural_motion
@@ -38,6 +38,11 @@ def test_reference_of_a_hard_mechanism_is_within_its_bound_of_thirty_digits(name
     place = in_many_digits(scene, times, SECONDS).position
     off = np.abs(a.position - place).max(axis=(1, 2))
     assert (off <= found.bound).all() and found.bound.max() <= 1e-12
+
+
+def test_bound_does_not_fall_after_a_sample_at_which_two_motions_differed():
+    """It is ten times the largest difference so far, and at least 1e-14, what doubles leave open."""
+    assert bounds(np.array([0.0, 1e-12, 1e-13])) == pytest.approx([1e-14, 1e-11, 1e-11])
 
 
 @pytest.mark.parametrize("move", [natural_motion, tree_motion])

@@ -225,22 +225,6 @@ def test_kernels_are_not_used_from_a_cache_in_which_others_can_write(place, tmp_
 
 
 @USERS
-@pytest.mark.slow
-def test_program_compiles_anew_beside_a_cache_in_which_others_can_write(tmp_path: Path):
-    """The program prints 7.0 and its number of compilations: 1 without a cache, 0 with one, 1 while others
-    can write in the cache's folder, and 0 with the old mode of the folder."""
-    cache, script = tmp_path / "cache", SMALL_KERNEL + COUNT_COMPILATIONS
-    assert [ran(script, tmp_path, cache)[0] for _ in range(2)] == ["7.0\n1\n", "7.0\n0\n"]
-    for folder in (tmp_path, cache, *cache.iterdir()):
-        folder.chmod(0o755)
-    cache.chmod(0o777)
-    out, error = ran(script, tmp_path, cache)
-    assert out == "7.0\n1\n" and "can be written by other users" in error and "Traceback" not in error
-    cache.chmod(0o755)
-    assert ran(script, tmp_path, cache)[0] == "7.0\n0\n"
-
-
-@USERS
 def test_folders_of_a_new_cache_have_mode_0700_whatever_the_umask(tmp_path: Path):
     """The umask 0 would give 0777."""
     before = os.umask(0)

@@ -208,6 +208,8 @@ def test_stop_just_below_the_reach_of_a_vibration_is_met(share):
     [
         pytest.param(pushed(), natural_motion, id="contact that ends, natural coordinates"),
         pytest.param(vibration(1e-4), natural_motion, id="stop below a reach, natural coordinates"),
+        pytest.param(balls(0.3), tree_motion, id="masses that part, tree of joints"),
+        pytest.param(ball(1e-3, 0.6), natural_motion, id="ball that comes to rest, natural coordinates"),
         pytest.param(door(), tree_motion, id="rod that rebounds, tree of joints", marks=pytest.mark.slow),
     ],
 )
