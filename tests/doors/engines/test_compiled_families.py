@@ -182,8 +182,8 @@ def test_mujocos_compiled_family_gives_the_true_motion(name: str, beta: float, m
 
 @pytest.mark.parametrize(("family", "beta"), [(FAMILY, 30.0), (PROJECTED, 0.0)], ids=[FAMILY, PROJECTED])
 def test_mujocos_compiled_families_move_and_react_by_gauss_s_principle(family: str, beta: float) -> None:
-    """Seven types of joints, with springs, a torsion spring, a force and a moment, and a body that flies freely.
-    Differences are at most ten times GAUSS; the projected family keeps joints closed to 1e-12 of the length."""
+    """A scene of seven types of joints, with springs, a force and a moment, and a body that flies freely. Off
+    by at most ten times GAUSS; the projected family keeps joints closed to 1e-12 of the length."""
     pytest.importorskip("mujoco")
     twist = {"velocity": (0.3, -0.2, 1.0), "angular_velocity": (3.0, 1.0, -2.0)}
     flying = body("flying", (2.0, 1.0, 1.5), (0.1, 0.2, 0.3), **twist)
@@ -299,8 +299,8 @@ def test_planar_scene_leaves_a_mechanism_that_can_leave_its_plane_unchanged() ->
     first, second = scene.joint[:2]
     ball = Spherical(name=second.name, bodies=second.bodies, anchor=second.anchor)
     spun = scene.body[1].model_copy(update={"angular_velocity": (0.0, 1.0, 0.0)})
-    for body in (scene.body[1], spun):
-        pendulum = scene.with_(body=(scene.body[0], body), joint=(first, ball))
+    for second_body in (scene.body[1], spun):
+        pendulum = scene.with_(body=(scene.body[0], second_body), joint=(first, ball))
         assert planar_scene(pendulum) is pendulum
 
 

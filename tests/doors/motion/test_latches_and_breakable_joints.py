@@ -81,8 +81,8 @@ def test_carts_latch_where_a_travel_or_a_distance_reaches_its_value(when):
 
 @pytest.mark.parametrize("end", [0.05, 0.1])
 def test_carts_latch_after_or_at_the_time_at_which_another_joint_lets_go(end):
-    """The interval of a third body's joint ends at 0.05 s or 0.1 s, where the travel of a cart at 2 m/s is 0.2
-    m. Then both carts move at -0.25 m/s, by their momentum; in the judge's motion, too."""
+    """A third body's joint lets go at 0.05 s or 0.1 s, when a cart at 2 m/s has moved by 0.2 m. Then both
+    carts move at -0.25 m/s, by their momentum; in the judge's motion, too."""
     latched, place = carts(active=None, when={"joint": "A", "reaches": 0.2}), (0.0, 0.0, 5.0)
     other = joint("X", "fixed", "ground", "third", place, active=[[0.0, end]])
     third = body("third", 1.0, [0.1] * 3, place)
