@@ -64,12 +64,15 @@ def add_derivatives(commands: Commands) -> None:
         "and wrong about the exact motion. An error up to 1e-6 of the largest derivative is right, up to "
         "1e-2 rough. Loads are left out, and drivers refused. A sentence says whether an error depends on "
         "open loops, on velocities, or on neither. Without ENGINE and SCENE the stored results are shown; "
-        "--run measures engines and stores them. Exit status: 1 if a derivative of a named engine or scene "
-        "is wrong"
+        "--run measures engines and stores them. --cards asks identities instead, which need no other "
+        "derivatives: closures and virtual work at neighbouring states, the chain rule along the motion, "
+        "energy, the engine's own differences, frames, units, order, redundant rows, speed and couplings. "
+        "Exit status: 1 if a derivative of a named engine or scene is wrong, or a card fails"
     )
     example = (
         "crosscheck derivatives\n  crosscheck derivatives pinocchio fast_four_bar\n"
-        "  crosscheck derivatives my.toml --engine mujoco --json\n  crosscheck derivatives my_module:ENGINE"
+        "  crosscheck derivatives my.toml --engine mujoco --json\n  crosscheck derivatives my_module:ENGINE\n"
+        "  crosscheck derivatives my_module:ENGINE --cards"
     )
     parser = add_command(commands, "derivatives", about, example)
     about = (
@@ -77,6 +80,8 @@ def add_derivatives(commands: Commands) -> None:
         "results; default: all engines that have such functions, and these mechanisms"
     )
     parser.add_argument("what", nargs="*", metavar="ENGINE|SCENE", help=about)
+    cards = "judge the named engines by identities on mechanisms of the cards"
+    parser.add_argument("--cards", action="store_true", help=cards)
     add_stored_runs(parser, DERIVATIVES)
     parser.add_argument("--json", action="store_true", help="print one JSON document and nothing else")
 

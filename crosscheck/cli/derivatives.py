@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
 from rich.box import SIMPLE
-from rich.table import Table as Shown
+from rich.table import Table
 
 from crosscheck.cli import request
 from crosscheck.cli.rendering import write_page
 from crosscheck.cli.running import COMPLETED, OTHERWISE, console, notice, print_json
 from crosscheck.cli.scene_request import find_scenes
 from crosscheck.derivatives import compare, records, sentences, table
+from crosscheck.derivatives.cards import CARDS, Verdict
 from crosscheck.derivatives.mechanisms import MECHANISMS
 from crosscheck.differentiating import Differentiating
 from crosscheck.engine import all_engines, engine, engine_names
+from crosscheck.processes.child import ChildFailed
 from mbref.scene import Scene
 
 Refusals = list[dict[str, str]]
@@ -25,6 +28,8 @@ Refusals = list[dict[str, str]]
 def derivatives(arguments: argparse.Namespace) -> int:
     """Compare engines on scenes, or show stored records; return 1 if a derivative that was compared is wrong
     or nothing was compared."""
+    if arguments.cards:
+        return _cards(arguments)
     if not arguments.what and (arguments.run or not arguments.engine):
         return _stored(arguments)
     if arguments.run or arguments.page:
@@ -46,6 +51,49 @@ def derivatives(arguments: argparse.Namespace) -> int:
     _print(arguments, found, refused)
     wrong = any(row.grade == compare.WRONG for row in found)
     return OTHERWISE if wrong or not found else COMPLETED
+
+
+def _cards(arguments: argparse.Namespace) -> int:
+    """Judge engines by all cards; return 1 if a card fails or none was asked."""
+    if arguments.run or arguments.page:
+        raise request.RequestError("--run and --page: serve the stored mechanisms, without --cards")
+    asked = [*arguments.what, *(arguments.engine or ())]
+    found: list[Verdict] = []
+    for name in request.find_engines(asked, notice) if asked else _differentiating():
+        notice(f"{name}: cards")
+        try:
+            found += records.carded(name)
+        except ChildFailed as failure:
+            found.append(Verdict(name, "", "", "", math.inf, 0.0, str(failure)))
+    if arguments.json:
+        print_json([{"cards": [_finite(each) for each in found]}])
+    else:
+        _show_cards(found)
+    failed = any(verdict.fails for verdict in found)
+    return OTHERWISE if failed or all(verdict.error is None for verdict in found) else COMPLETED
+
+
+def _finite(verdict: Verdict) -> dict[str, object]:
+    """Return the fields of a verdict; an infinite error, of derivatives that cannot be used, as None."""
+    error = verdict.error
+    unusable = error is not None and not math.isfinite(error)
+    return {**verdict._asdict(), "error": None if unusable else error, "fails": verdict.fails}
+
+
+def _show_cards(found: Sequence[Verdict]) -> None:
+    out = console()
+    shown = Table("engine", "function", "card", "mechanism", "error", "", title="cards", box=SIMPLE)
+    for verdict in found:
+        error = "–" if verdict.error is None else f"{verdict.error:.0e}"
+        sign = "✗" if verdict.fails else "–" if verdict.error is None else "✓"
+        shown.add_row(verdict.engine, verdict.function, verdict.card, verdict.scene, error, sign)
+    out.print(shown)
+    for card in dict.fromkeys(verdict.card for verdict in found if verdict.fails and verdict.card):
+        out.print(f"{card}: {CARDS[card].about}", soft_wrap=True)
+    for verdict in found:
+        if verdict.reason:
+            where = " ".join(part for part in (verdict.engine, verdict.card, verdict.scene) if part)
+            out.print(f"{where}: {verdict.reason}", soft_wrap=True)
 
 
 def _scenes(paths: Sequence[str]) -> list[Scene]:
@@ -93,7 +141,7 @@ def _show(found: Sequence[compare.Row], refused: Refusals) -> None:
     out = console()
     if found:
         headings = ("engine", "function", "scene", "state", "against", *compare.BLOCKS)
-        shown = Shown(*headings, title="relative errors of derivatives of accelerations", box=SIMPLE)
+        shown = Table(*headings, title="relative errors of derivatives of accelerations", box=SIMPLE)
         cells: dict[tuple[str, ...], dict[str, str]] = {}
         for row in found:
             key = (row.engine, row.function, row.scene, row.state, row.truth)

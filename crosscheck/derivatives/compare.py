@@ -12,6 +12,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -190,8 +191,27 @@ def _by_differences(found: OwnDerivatives, source: Source, scene: Scene) -> Iter
         size = scale
 
 
-def along_constraints(found: OwnDerivatives, judged: StateDerivatives, scene: Scene) -> TangentDerivatives:
-    """Return an engine's derivatives along the judge's allowed motions, by the judge's rule.
+class Allowed(Protocol):
+    """Allowed displacements (6 nb, f), and the changes of twists (6 nb, f) along them."""
+
+    @property
+    def basis(self) -> np.ndarray: ...
+
+    @property
+    def carried(self) -> np.ndarray: ...
+
+
+def own_rows(
+    engine: Differentiating, found: OwnDerivatives, source: tuple[str, str, str, str], scene: Scene
+) -> Iterator[Row]:
+    """Yield the errors against differences of the engine's own accelerations, with closed and open loops."""
+    if _is_smooth(found, scene):
+        yield from _by_differences(found, (*source, MOVING), scene)
+    yield from _open(engine, found, (*source, OPEN), scene)
+
+
+def along_constraints(found: OwnDerivatives, judged: Allowed, scene: Scene) -> TangentDerivatives:
+    """Return an engine's derivatives along allowed motions, by the judge's rule.
 
     Raises ValueError if the engine's coordinates cannot move as the joints allow.
     """

@@ -74,6 +74,41 @@ def _rod(name: str, mass: float, x: float, y: float) -> dict[str, Any]:
     return {"name": name, "mass": mass, "inertia": [0.01, 0.02, 0.03], "position": [x, y, 0.0]}
 
 
+def _whirling() -> Scene:
+    """Return a body that turns about a ball joint while a link of constant length to the point P holds its
+    point Q. Its angular velocity, Q + P, is perpendicular to Q × P, so that the link keeps its length."""
+    p, q = (0.7, -0.3, 0.6), (0.5, 0.4, 0.2)
+    ball = {"name": "ball", "type": "spherical", "bodies": ["ground", "b"], "anchor": [0.0, 0.0, 0.0]}
+    link = {"name": "link", "type": "distance", "bodies": ["ground", "b"], "anchors": [p, q]}
+    spin = tuple(a + b for a, b in zip(p, q, strict=True))
+    body = _rod("b", 1.3, 0.4, 0.2) | {"inertia": [0.2, 0.3, 0.4], "angular_velocity": spin}
+    body["position"] = [0.4, 0.2, 0.1]
+    return Scene(name="whirling", gravity=(0.0, -3.0, -9.0), duration=1.0, body=[body], joint=[ball, link])
+
+
+def _coupled(law: dict[str, Any]) -> Scene:
+    """Return a crank that a coupling joins to a wheel, and a rod on the wheel's rim of which a link of
+    constant length holds the end to the crank."""
+    axis = {"type": "revolute", "axis": [0.0, 0.0, 1.0]}
+    pins = (
+        ("A", "ground", "crank", (0.0, 0.0)),
+        ("W", "ground", "wheel", (0.6, 0.0)),
+        ("P", "wheel", "rod", (0.8, 0.1)),
+    )
+    joints = [{**axis, "name": n, "bodies": [a, b], "anchor": [*at, 0.0]} for n, a, b, at in pins]
+    ends = [[0.1, 0.3, 0.0], [0.7, 0.5, 0.0]]
+    joints.append({"name": "link", "type": "distance", "bodies": ["crank", "rod"], "anchors": ends})
+    bodies = [
+        _rod("crank", 1.0, 0.05, 0.15) | {"angular_velocity": [0.0, 0.0, RATE]},
+        _rod("wheel", 2.0, 0.6, 0.0),
+        _rod("rod", 0.7, 0.75, 0.3),
+    ]
+    coupling = [{"name": "gears", "joints": ["A", "W"], **law}]
+    return Scene(
+        name="coupled", gravity=(0.0, -9.81, 0.0), duration=1.0, body=bodies, joint=joints, coupling=coupling
+    )
+
+
 def _point() -> Scene:
     return _of_file(FINDINGS / "ball_four_bar.toml")
 
@@ -113,4 +148,17 @@ MECHANISMS = (
         f"A slider-crank with equal crank and rod, {NEAR:g} rad from its singular position.",
         _near_singular,
     ),
+)
+
+BY_NAME = {mechanism.name: mechanism for mechanism in MECHANISMS}
+# mechanisms of the cards
+SPATIAL = (
+    Mechanism("whirling", "A body on a ball joint and a link; its principal axes turn.", _whirling),
+    BY_NAME["ball_four_bar"],
+    BY_NAME["random_2"],
+)
+FAST_LOOP, REDUNDANT = (BY_NAME["fast_four_bar"],), (BY_NAME["hinged_four_bar"],)
+COUPLED = (
+    Mechanism("geared", "A gear pair in a loop.", lambda: _coupled({"ratio": -0.5})),
+    Mechanism("cam", "A cam of degree 2 in a loop.", lambda: _coupled({"polynomial": [-0.5, 0.3]})),
 )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
-from crosscheck.derivatives import compare
+from crosscheck.derivatives import cards, compare
 from crosscheck.derivatives.mechanisms import MECHANISMS, Mechanism
 from crosscheck.differentiating import Differentiating
 from crosscheck.engine import engine
@@ -102,7 +102,18 @@ def compared(name: str, scene: Scene) -> tuple[list[compare.Row], Cannot | None]
         found: tuple[list[compare.Row], Cannot | None] = pool.apart(_of_engine, (name, scene), SECONDS)
         return found
     except ChildFailed as failure:
-        return [], Cannot(Owner.ENGINE, str(failure))
+        return [], Cannot(Owner.ENGINE, str(failure).partition("; last printed")[0])
+
+
+def carded(name: str) -> list[cards.Verdict]:
+    """Return the verdicts of all cards on an engine from a child process. Raises ChildFailed."""
+    found: list[cards.Verdict] = pool.apart(_carded, (name,), SECONDS)
+    return found
+
+
+def _carded(name: str) -> list[cards.Verdict]:
+    """Return the verdicts of all cards on an engine; called in a child."""
+    return [*cards.verdicts(engine(name))]
 
 
 def _of_engine(name: str, scene: Scene) -> tuple[list[compare.Row], Cannot | None]:

@@ -32,12 +32,15 @@ REASONS = {
     "heyoka": Cannot(
         Owner.ADAPTER, "the adapter compiles heyoka's equations of motion without variational equations"
     ),
-    "mjx": Cannot(Owner.ADAPTER, "the adapter does not differentiate MJX's steps by JAX"),
     "warp": Cannot(
-        Owner.ADAPTER, "the adapter does not record MuJoCo Warp's kernels on Warp's tape for gradients"
+        Owner.ENGINE,
+        "MuJoCo Warp compiles its kernels without adjoints (enable_backward is False in all of its modules), "
+        "so Warp's tape gives no gradients of a step",
     ),
     "newton": Cannot(
-        Owner.ADAPTER, "the adapter does not record Newton's kernels on Warp's tape for gradients"
+        Owner.ADAPTER,
+        "Kamino and MuJoCo Warp, which close loops, compile their kernels without adjoints; XPBD and "
+        "SemiImplicit have them, and the adapter does not record their steps on Warp's tape",
     ),
 }
 

@@ -69,7 +69,7 @@ class Faulty(Differentiating, Engine):
     """An engine with correct accelerations and a fault of their derivatives."""
 
     package = ""
-    supports = Supports(joints=tuple(JOINT_TYPES))
+    supports = Supports(joints=tuple(JOINT_TYPES), couplings=("angle", "displacement"), powers=2)
     differentiates_by = WAYS
 
     def __init__(self, fault: str):
@@ -148,7 +148,9 @@ def _terms_at(scene: Scene, place: bytes, rate: bytes) -> tuple[np.ndarray, dict
         spun[b, 3:] = np.cross(spin[b], inertia[b] @ spin[b])
     matrix[n:, :n], matrix[:n, n:] = rows, rows.T
     bias = closure_accelerations(scene, 0.0, *pose, twists[:, :3], spin, still, still)
-    gaps = np.concatenate([*closure(scene, 0.0, *pose).values()])
+    gaps = np.zeros(m)  # couplings are not stabilised
+    closed = np.concatenate([*closure(scene, 0.0, *pose).values()])
+    gaps[: len(closed)] = closed
     none, right = np.zeros(n), np.zeros(m)
     stabilised = 2 * BETA * rows @ v + BETA**2 * gaps
     return matrix, {
@@ -178,7 +180,7 @@ def _solved(matrix: np.ndarray, rest: np.ndarray, force: np.ndarray) -> tuple[np
     """Return a and λ with [M Jᵀ; J 0] (a, λ) + rest = (force, 0)."""
     right = -rest
     right[: len(force)] += force
-    found = np.linalg.solve(matrix, right)
+    found = np.linalg.lstsq(matrix, right, rcond=1e-11)[0]  # rows may be redundant
     return found[: len(force)], found[len(force) :]
 
 

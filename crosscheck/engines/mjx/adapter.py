@@ -7,13 +7,13 @@ in the user's cache folder for later processes.
 
 from __future__ import annotations
 
-import contextlib
 import functools
 from collections.abc import Sequence
-from importlib import import_module
 from typing import Any
 
 from crosscheck.engine import Alternatives, Setting
+from crosscheck.engines.mjx.derivatives import Differentiated
+from crosscheck.engines.mjx.library import imported
 from crosscheck.engines.mujoco.ports import FAMILIES, OWN_STEPS, STOCK, WAY, WAYS, Port, PortedModel
 from crosscheck.engines.shared import file_cache
 from crosscheck.engines.shared.own_steps import Steps
@@ -22,7 +22,7 @@ from crosscheck.engines.shared.tree_reactions import LinkMotion
 SINGLE = "stock, single"
 
 
-class Mjx(Port):
+class Mjx(Differentiated, Port):
     """MuJoCo MJX (PyPI ``mujoco-mjx``)."""
 
     name = "mjx"
@@ -37,28 +37,11 @@ class Mjx(Port):
     )
 
     def prepare(self, families: Sequence[str]) -> None:
-        _mjx()
+        imported()
 
     def in_port(self, ported: PortedModel, family: str) -> Steps:
         """Return a model of MuJoCo in JAX."""
         return _World(ported, family == SINGLE)
-
-
-def _mjx(is_single: bool = False) -> Any:
-    """Return the modules jax and mujoco.mjx, set to double or single precision on the processor."""
-    jax: Any = import_module("jax")
-    config = jax.config
-    if config.jax_enable_x64 == is_single:  # traces of the other precision fail
-        config.update("jax_enable_x64", not is_single)
-        jax.clear_caches()
-    config.update("jax_platforms", "cpu")
-    if not config.jax_compilation_cache_dir:
-        with contextlib.suppress(OSError):  # without the folder, no code is stored
-            (folder := file_cache.cache("mjx")).mkdir(parents=True, exist_ok=True)
-            config.update("jax_compilation_cache_dir", str(folder))
-    from mujoco import mjx
-
-    return jax, mjx
 
 
 @functools.cache
@@ -67,7 +50,7 @@ def _stepped(is_single: bool) -> Any:
 
     Models that differ only in numbers, such as masses and places, share the compiled code.
     """
-    jax, mjx = _mjx(is_single)
+    jax, mjx = imported(is_single)
 
     def once(model: Any, now: Any) -> Any:
         # MJX 3.17 makes 64-bit integers of some 32-bit indices of tendons, which a loop of JAX refuses
@@ -83,7 +66,7 @@ class _World:
     """A model and its data in JAX, and compiled code that takes steps."""
 
     def __init__(self, ported: PortedModel, is_single: bool):
-        _, mjx = _mjx(is_single)
+        _, mjx = imported(is_single)
         self.ported, self.tree = ported, ported.built.tree
         self.model = mjx.put_model(ported.model)
         self.data = mjx.put_data(ported.model, ported.data)

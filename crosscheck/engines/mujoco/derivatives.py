@@ -1,4 +1,7 @@
-"""Derivatives of accelerations by MuJoCo's own finite differences of one time step (mjd_transitionFD)."""
+"""Derivatives of accelerations by MuJoCo's own finite differences of one time step (mjd_transitionFD).
+
+A port of MuJoCo differentiates its own step in the same coordinates (``Stepped``).
+"""
 
 from __future__ import annotations
 
@@ -27,19 +30,23 @@ class Differentiated(Differentiating):
         HARD: f"mjd_transitionFD of a step of {STEP:g} s, closures as stiff as MuJoCo allows, over the step",
     }
 
+    def stepped(self, scene: Scene, function: str) -> Stepped:
+        """Return the model whose step is differentiated."""
+        return Stepped(scene, function)
+
     def own_derivatives(self, scene: Scene, function: str, away: np.ndarray | None = None) -> OwnDerivatives:
         """Return the derivatives at the start, displaced by ``away`` along unit velocities."""
-        model = _Differentiated(scene, function)
+        model = self.stepped(scene, function)
         at = np.zeros(model.nv) if away is None else away
         v, none = model.made.rates, np.zeros(model.nv)
-        by_position, by_velocity = model.transition(at, v)
+        by_position, by_velocity, by_force = model.transition(at, v)
         return OwnDerivatives(
             coordinates=names_of_rates(scene, model.made.tree),
             velocity=v,
             acceleration=model.accelerations(at, none, v, none),
             by_position=by_position,
             by_velocity=by_velocity,
-            by_force=None,
+            by_force=by_force,
             bodies=lambda step, rate, change: model.bodies(at + step, rate, change),
             opening=lambda step, rate: model.opening(at + step, rate),
             own=lambda step, rate, force: model.accelerations(at, step, rate, force),
@@ -47,8 +54,8 @@ class Differentiated(Differentiating):
         )
 
 
-class _Differentiated:
-    """A scene in MuJoCo by one of the ways."""
+class Stepped:
+    """A scene in MuJoCo by one of the ways, with the mean acceleration of a step and its derivatives."""
 
     def __init__(self, scene: Scene, function: str):
         import mujoco
@@ -68,15 +75,16 @@ class _Differentiated:
         data.qvel[:] = v
         return data
 
-    def transition(self, at: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the derivatives (nv, nv) of the mean acceleration of a step, by positions and velocities."""
+    def transition(self, at: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+        """Return the derivatives (nv, nv) of the mean acceleration of a step, by positions, velocities and
+        generalised forces; None if there are none by forces."""
         size, h, nv = 2 * self.nv + self.model.na, self.model.opt.timestep, self.nv
         found, data = np.zeros((size, size)), self.at([at], v)
         with without_warnings(self.mujoco):
             self.mujoco.mj_forward(self.model, data)
             self.mujoco.mjd_transitionFD(self.model, data, INCREMENT, True, found, None, None, None)
         lower = found[nv : 2 * nv]
-        return lower[:, :nv] / h, (lower[:, nv : 2 * nv] - np.eye(nv)) / h
+        return lower[:, :nv] / h, (lower[:, nv : 2 * nv] - np.eye(nv)) / h, None
 
     def accelerations(self, at: np.ndarray, step: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Return the mean acceleration (nv,) of one time step."""
