@@ -94,8 +94,8 @@ class Judged:
         return {least.engine: least for least in least_errors(self.comparable)}
 
     def best(self) -> dict[str, Record]:
-        """Return for each engine the record of least error, without a truth that of a finest run, otherwise
-        the record that ended last."""
+        """Return for each engine the record of least error; without a truth the record of a finest run,
+        otherwise the record that ended last."""
         return {name: least.best for name, least in self.engines().items()}
 
     def defaults(self) -> dict[str, Record]:
