@@ -10,7 +10,8 @@ def least_norm(matrix: np.ndarray, rhs: np.ndarray, tolerance: float) -> np.ndar
 
     Singular values below ``tolerance`` times the largest count as zero.
     """
-    return _pseudo_solutions(*np.linalg.svd(matrix, full_matrices=False), rhs, tolerance)[0]
+    left, values, right = np.linalg.svd(matrix, full_matrices=False)
+    return _pseudo_solutions(left, values, right, rhs, tolerance)[0]
 
 
 def least_norm_and_null_space(

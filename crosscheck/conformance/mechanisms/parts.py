@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -24,8 +24,8 @@ from mbref.scene import (
 GRAVITY, DOWN = (0.0, -9.81, 0.0), (0.0, 0.0, -9.81)
 Z = (0.0, 0.0, 1.0)
 Triple = tuple[float, float, float]
-Rng = np.random.Generator
-Place = Sequence[float] | np.ndarray
+Rng: TypeAlias = np.random.Generator
+Place: TypeAlias = Sequence[float] | np.ndarray
 
 
 def triple(values: Any) -> Triple:

@@ -12,7 +12,7 @@ are left out. Entries that are always zero need no operations, since the arithme
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from crosscheck.engines.shared.symbolic.symbols import NOTHING, NUMBERS, Arithme
 from crosscheck.engines.shared.tree_reactions import LinkMotion, wrench
 from mbref.scene import Moment, Scene
 
-Entries = Sequence[Any] | np.ndarray  # numbers or symbols
+Entries: TypeAlias = Sequence[Any] | np.ndarray  # numbers or symbols
 SEED = 1  # random seed of the pose at which vanishing rows are found
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from crosscheck.engines.shared.spanning_tree import TURN
 from crosscheck.engines.shared.symbolic.symbols import NOTHING, Arithmetic
 
-Vector = np.ndarray  # (3,) numbers or symbols
+Vector: TypeAlias = np.ndarray  # (3,) numbers or symbols
 
 
 @dataclass(frozen=True)
