@@ -215,7 +215,7 @@ class StepStart(NamedTuple):
 
 
 class TurnWatch(NamedTuple):
-    """Rotation since angles of joints were computed."""
+    """Rotation since angles of joints and signs of quaternions were computed."""
 
     unseen: float = 0.0  # rad, a bound for each body
 
@@ -233,6 +233,7 @@ class Waiting(NamedTuple):
 
     state: Annotated[Matrix, "k", "3*lanes"]  # variables and their two derivatives
     angles: Annotated[Matrix, "k", "angles"]  # rad, up to MOST_TURN of each body from the sample
+    coordinates: Annotated[Matrix, "k", "7*nb"]  # whose quaternions are of a rotation up to MOST_TURN away
     exact: Annotated[Indices, "k"]  # 1 for a high-accuracy step near a singular position
 
 

@@ -65,11 +65,11 @@ def complete_until(end, memory):
 def complete_sample(memory):
     """Record the sample at the clock; return OK or the failure status.
 
-    The sign of its quaternions agrees with the previous sample, or the start.
+    The signs of its quaternions follow the rotations since the start, whatever other samples there are.
     """
     run, waiting = memory.run, memory.waiting
-    k, status, before = run.loop.clock.sample, OK, run.loop.samples.coordinates
-    copy(before[k - 1] if k > 0 else run.previous.coordinates, run.state.coordinates)
+    k, status = run.loop.clock.sample, OK
+    copy(waiting.coordinates[k], run.state.coordinates)
     copy(waiting.state[k], memory.state.reshape(-1))
     copy(waiting.angles[k], run.equations.angles)
     if not waiting.exact[k]:

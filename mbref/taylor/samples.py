@@ -124,6 +124,7 @@ def keep_sample(h, memory):
     put_angles(h, memory)
     copy(memory.state.reshape(-1), waiting.state[clock.sample])
     copy(memory.run.equations.angles, waiting.angles[clock.sample])
+    copy(memory.run.state.coordinates, waiting.coordinates[clock.sample])
     waiting.exact[clock.sample] = is_accurate(memory)
     clock.sample += 1
 

@@ -1,8 +1,9 @@
-"""Full turns of joints along a series: an angle is computed before a body may have turned by a right angle.
+"""Full turns along a series: angles and quaternions are computed before a body may turn by a right angle.
 
-A pose shows an angle up to full turns. The angle is the one nearest to the last computed angle, if no body
-has turned by a right angle since then. A bound of the rotation, from the rates of the variables, says when
-angles must be computed again: once in many short steps, and several times in a long step.
+A pose shows an angle up to full turns, and a quaternion up to its sign. The right one is nearest to the last
+computed one, if no body has turned by a right angle since then. A bound of the rotation, from the rates of
+the variables, says when both must be computed again: once in many short steps, and several times in a long
+step.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from numpy import sqrt
 
 from mbref.equations.loads import remember_angles
 from mbref.kernels.compilation import kernel
-from mbref.taylor.samples import evaluate_series
+from mbref.taylor.samples import evaluate_series, put_quaternion
 from mbref.taylor.simd import WIDTH, load, max_abs
 
 MOST_TURN = 1.5  # rad; largest rotation of a body between computed angles: less than π/2
@@ -37,8 +38,6 @@ def begin_turns(memory):
             count += squares[i] > 0.0
         for i in range(squares.shape[0]):
             weights[i] = max(weights[i], count * sqrt(0.5 * squares[i]))
-    if memory.run.equations.angles.shape[0] == 0:
-        weights[:] = 0.0
     remember_angles(memory.run.equations)
     memory.turns.watch.unseen = 0.0
 
@@ -88,13 +87,16 @@ def follow_turns(start, end, speed, memory):
 
 @kernel
 def see_angles(h, memory):
-    """Compute the angles at a distance h (s) from the start of the last step."""
+    """Compute the angles and quaternions at a distance h (s) from the start of the last step."""
     if h == 0.0:
         put_rotations(memory.series.past, memory)
     else:
         evaluate_series(h, memory)
         put_rotations(memory.state, memory)
     remember_angles(memory.run.equations)
+    rotation, q = memory.run.equations.frames.rotation, memory.run.state.coordinates
+    for b in range(rotation.shape[0] - 1):
+        put_quaternion(rotation[b], q[7 * b + 3 : 7 * b + 7])
 
 
 @kernel

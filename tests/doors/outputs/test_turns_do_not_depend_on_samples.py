@@ -1,4 +1,4 @@
-"""Angles, torques and energies at a time do not depend on the other samples that a run is asked for."""
+"""Angles, torques, energies and signs of quaternions at a time do not depend on the other samples that a run is asked for."""
 
 import csv
 import json
@@ -21,7 +21,7 @@ from tests.helpers.spinning import spinning_mechanism
 END = 3.0  # s, in which the fastest joints make some 20 turns
 NATURAL, STIFFNESS, INERTIA = 40.0, 12.0, 3.0  # rad, N m/rad, kg m²
 TIMES = np.linspace(0.0, END, 601)
-OUTPUTS = (".angle", ".torque", "energy")
+OUTPUTS = (".angle", ".torque", "energy", *(f".orientation.{part}" for part in "wxyz"))
 # taylor computes samples inside its steps. Other methods end steps at samples, so that their errors differ:
 # up to 1e-4 of an output in 20 turns. A missed turn would change an angle by 0.05 of its size or more.
 ROUNDING, STEPS = 1e-12, 1e-3  # relative differences of outputs: by rounding, and by steps of other lengths
@@ -71,8 +71,8 @@ def differences(dense: mbref.Motion, method: str, random: np.random.Generator) -
 )
 @pytest.mark.parametrize("times", [[END], [0.4, 1.3, 2.9], [2.2, END]])
 def test_angle_of_a_wheel_on_a_spring_counts_full_turns_from_the_start(method, tolerance, times):
-    """φ = 40 (1 - cos 2 t) rad, spring torque -12 (φ - 40), energy 12 · 40² / 2. The samples asked for are
-    turns apart. The tolerance of a method is far below a missed turn, 6.28 rad."""
+    """φ = 40 (1 - cos 2 t) rad, spring torque -12 (φ - 40), energy 12 · 40² / 2, quaternion cos φ/2 + k sin φ/2.
+    The samples asked for are turns apart. The tolerance of a method is far below a missed turn, 6.28 rad."""
     motion = mbref.simulate(wound_wheel(), method, times)
     t = np.array(times)
     angle = NATURAL * (1.0 - np.cos(2.0 * t))
@@ -80,6 +80,8 @@ def test_angle_of_a_wheel_on_a_spring_counts_full_turns_from_the_start(method, t
     torque = -STIFFNESS * (angle - NATURAL)
     assert motion.load_at(0).torque == pytest.approx(torque, rel=tolerance, abs=STIFFNESS * tolerance)
     assert motion.energy == pytest.approx(STIFFNESS * NATURAL**2 / 2, rel=tolerance)
+    quaternion = np.stack((np.cos(angle / 2), 0 * t, 0 * t, np.sin(angle / 2)), axis=1)
+    assert np.abs(motion["wheel"].orientation - quaternion).max() < NATURAL * tolerance
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -153,6 +155,7 @@ def test_turns_of_steady_gears_are_counted_by_their_rates_where_samples_are_turn
     scene = gear_pair(load=[], driver=[{"joint": "A", "polynomial": [0.0, 9.0]}], duration=6.0)
     motion = replace(mbref.simulate(scene, times=times), angles=None)
     assert mbref.Motion.of(scene, motion).joint("A").angle == pytest.approx(9.0 * times, rel=1e-12)
+    assert motion["pinion"].orientation[:, 0] == pytest.approx(np.cos(4.5 * times), abs=1e-12)
     state = motion.position, motion.orientation, motion.angular_velocity
     (gap,) = coupling_gaps(scene, times, *state).values()
     assert np.abs(gap).max() < 1e-10  # rad, of angles of 54 rad
