@@ -1,4 +1,4 @@
-"""Angles, torques, energies and signs of quaternions at a time do not depend on the other samples that a run is asked for."""
+"""Angles, torques, energies and signs of quaternions at a time do not depend on other samples of a run."""
 
 import csv
 import json
@@ -71,8 +71,8 @@ def differences(dense: mbref.Motion, method: str, random: np.random.Generator) -
 )
 @pytest.mark.parametrize("times", [[END], [0.4, 1.3, 2.9], [2.2, END]])
 def test_angle_of_a_wheel_on_a_spring_counts_full_turns_from_the_start(method, tolerance, times):
-    """φ = 40 (1 - cos 2 t) rad, spring torque -12 (φ - 40), energy 12 · 40² / 2, quaternion cos φ/2 + k sin φ/2.
-    The samples asked for are turns apart. The tolerance of a method is far below a missed turn, 6.28 rad."""
+    """φ = 40 (1 - cos 2 t) rad, spring torque -12 (φ - 40), energy 12 · 40² / 2, a quaternion of
+    cos φ/2 and sin φ/2, at samples that are turns apart. A missed turn is 6.28 rad."""
     motion = mbref.simulate(wound_wheel(), method, times)
     t = np.array(times)
     angle = NATURAL * (1.0 - np.cos(2.0 * t))
