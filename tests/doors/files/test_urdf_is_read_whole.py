@@ -163,3 +163,10 @@ def test_limits_that_the_file_s_motion_cannot_keep_are_refused_or_left_out(files
 def test_a_limit_with_one_end_that_does_not_act_is_left_out_with_a_remark(files):
     """The crank falls away from 0, the lower end."""
     assert "1 limit of a joint" in files.scene(limited("", 'upper="1"'), "r.urdf")[1]
+
+
+def test_a_planar_joint_keeps_its_name(files):
+    """MuJoCo makes three joints of it, whose names have ends of their own."""
+    first = hinge("ja", "base", "a", "0 0 0").replace("continuous", "planar")
+    scene, _ = files.scene(robot(first, *CRANKS[1:]), "r.urdf")
+    assert scene.joint_named("ja").type == "planar"

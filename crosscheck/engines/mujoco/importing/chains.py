@@ -23,6 +23,7 @@ from mbref.scene import (
 
 ALIGNED = 1e-9  # largest difference of unit vectors, and of points / extent of the model
 RANK = 1e-9  # singular value / largest one; smaller ones belong to dependent motions
+OF_PLANAR = ("_TX", "_TY", "_RZ")  # ends of the names of MuJoCo's joints for a planar joint of a URDF
 Made = list[tuple[type[Any], dict[str, Any]]]
 
 
@@ -106,6 +107,8 @@ def joints_of(chain: Chain, groups: Groups, extent: float) -> list[Joint] | None
         return None
     own = [groups.model.joint(j).name for j in chain.joints]
     name = next((n for n in own if n), f"{pair[1]} joint")
+    if own == [name.removesuffix(OF_PLANAR[0]) + suffix for suffix in OF_PLANAR]:
+        name = name.removesuffix(OF_PLANAR[0])
     found: list[Joint] = []
     for kind, places in made:
         label = name if not found else f"{name} {kind.__name__.lower()}"
