@@ -39,6 +39,7 @@ ENGINES = ("mujoco", "pinocchio", "exudyn", "simbody", "dart", "drake")
 
 def closed_loops(arguments: argparse.Namespace) -> int:
     """Measure engines and write the page if requested, and print the table of engines and mechanisms."""
+    _check_engine(arguments)
     path = Path(arguments.records)
     if arguments.run:
         _measure(arguments, path)
@@ -79,6 +80,7 @@ def _legend(out: Console) -> None:
 
 def convergence(arguments: argparse.Namespace) -> int:
     """Measure engines and write the page if requested, and print the table of errors and orders."""
+    _check_engine(arguments)
     path = Path(arguments.records)
     if arguments.run:
         engines = request.find_engines(arguments.engine or ["all"], notice)
@@ -115,6 +117,14 @@ def _of_scenes() -> Table:
     return table
 
 
+def _check_engine(arguments: argparse.Namespace) -> None:
+    """Raise RequestError for an engine that no run measures."""
+    if arguments.engine and not arguments.run:
+        raise request.RequestError(
+            "--engine: names an engine that --run measures; without --run all stored runs are shown"
+        )
+
+
 def _some(records: list[Record], path: Path) -> list[Record]:
     """Return the records of a file; raises RequestError if there are none."""
     if not records:
@@ -132,6 +142,7 @@ def _name_left_out(records: Sequence[Record], shown: Sequence[Record]) -> None:
 
 def invariants(arguments: argparse.Namespace) -> int:
     """Measure engines and write the page if requested, and print the tables of invariants and laws."""
+    _check_engine(arguments)
     path = Path(arguments.records)
     if arguments.run:
         kept.measure(request.find_engines(arguments.engine or ["all"], notice), path, notice)
@@ -151,6 +162,7 @@ def invariants(arguments: argparse.Namespace) -> int:
 def alternatives(arguments: argparse.Namespace) -> int:
     """Measure engines and write the page if requested, and print a line for each engine and for each
     cause of differences above a limit."""
+    _check_engine(arguments)
     path = Path(arguments.records)
     if arguments.run:
         engines = request.find_engines(arguments.engine or ["all"], notice)
@@ -176,6 +188,7 @@ def modes(arguments: argparse.Namespace) -> int:
         (scene,) = find_scenes([arguments.scene], notice=notice)
         found = poses.measured(scene, engines, starts=arguments.starts, progress=notice)
     else:
+        _check_engine(arguments)
         if arguments.run:
             rewrite(poses.FILE, poses.merged(poses.of_mechanisms(engines, notice), poses.read()))
         found = poses.read()

@@ -45,6 +45,8 @@ class Fake(Still):
 
 
 class Segfault(Fake):
+    name = "fake that crashes"
+
     def act(self, scene: Scene) -> None:
         os.write(2, b"about to touch a bad pointer\n")
         os.kill(os.getpid(), signal.SIGSEGV)

@@ -436,3 +436,11 @@ def test_compare_tries_every_family_before_it_says_that_an_engine_completes_no_r
     asked = ("--engine", f"{FAKES}:LAST_ONE_RUNS", "--setting", "first")
     status, out, _ = run_main(capsys, "compare", still, *asked)
     assert "last completes no run" in " ".join(out.split()) and "fourth" not in out, out
+
+
+@pytest.mark.parametrize("command", ["alternatives", "closed-loops", "convergence", "invariants", "modes"])
+@pytest.mark.parametrize("name", ["mujoco", "no such engine"])
+def test_an_engine_without_run_is_refused_where_stored_runs_of_all_engines_are_shown(capsys, command, name):
+    """The tables have every engine: the option would be ignored, also with an unknown name."""
+    status, out, err = run_main(capsys, command, "--engine", name)
+    assert status == 2 and not out and ("--run" in err or f"unknown engine {name!r}" in err), err
