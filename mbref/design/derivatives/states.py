@@ -17,6 +17,9 @@ from mbref.equations.coordinates import displace_all
 from mbref.equations.model import Model, Terms
 from mbref.kernels.scene_layout import SPRING
 
+# change (lengths, rad, or of a rate) that is an underflow of rounding and counts as zero; a step of
+# differences over a smaller one would overflow
+UNDERFLOW = 1e-200
 FAST = 10.0  # of which residuals and outputs are polynomials of low degree, so that only rounding limits it
 
 
@@ -74,7 +77,7 @@ class Direction(NamedTuple):
             step * shortest_spring(model, states.q)
         )
         largest = np.max([moved, *shares], axis=0)
-        return np.asarray(1.0 / np.where(largest > 0.0, largest, 1.0))
+        return np.asarray(1.0 / np.where(largest > UNDERFLOW, largest, 1.0))
 
 
 def shortest_spring(model: Model, q: np.ndarray) -> np.ndarray:
@@ -132,7 +135,7 @@ class Residuals:
         ``Direction.steps``."""
         model, states = self.model, self.states
         sizes = np.abs(x / model.units).max(axis=1, initial=0.0)
-        steps = (step * self._spring / np.where(sizes > 0.0, sizes, 1.0))[:, None]
+        steps = (step * self._spring / np.where(sizes > UNDERFLOW, sizes, 1.0))[:, None]
 
         def at(h: np.ndarray) -> Terms:
             return terms_along(model, states._replace(q=states.displaced(h * x)))
@@ -145,7 +148,7 @@ class Residuals:
         degree 2; the change of Φ_q v - ν is left out."""
         states, sizes = self.states, np.abs(v).max(axis=1, initial=0.0)
         speed = FAST * np.abs(states.v).max(initial=0.0) or 1.0
-        h = (speed / np.where(sizes > 0.0, sizes, 1.0))[:, None]
+        h = (speed / np.where(sizes > UNDERFLOW, sizes, 1.0))[:, None]
         ahead, behind = (terms_along(self.model, states._replace(v=states.v + s * v)) for s in (h, -h))
         gamma, force = (ahead.gamma - behind.gamma) / (2 * h), (ahead.force - behind.force) / (2 * h)
         return np.concatenate([np.zeros((len(v), 2 * self.model.m)), -gamma, -force], axis=1)

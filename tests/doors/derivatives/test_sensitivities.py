@@ -187,6 +187,44 @@ def test_equilibrium_of_a_pendulum_with_a_torsion_spring_moves_as_in_closed_form
     assert_close(found.values[0], np.array(true))
 
 
+@pytest.mark.slow
+def test_equilibrium_of_two_coupled_links_moves_with_their_pin_as_in_closed_form():
+    """With angles a and b of the links from rest, the potential is g (m₁ y₁ + m₂ y₂) + 8 (a + b - n)²/2 +
+    15 (b - n')², as the wheel turns by a + b. Its gradient changes by (0, -m₂ g) if the pin moves along x.
+    The effect of the pin on the closed pose is rounding, which may underflow."""
+    bodies = [
+        body("rod", 1.2, [0.01, 0.02, 0.03], (0.3, 0.05, 0.0)),
+        body("arm", 0.7, [0.01, 0.02, 0.02], (0.8, 0.1, 0.0)),
+        body("wheel", 0.5, [0.02, 0.02, 0.03], (-0.5, 0.0, 0.0)),
+    ]
+    ends = {"A": ("ground", "rod", (0.0, 0.0, 0.0)), "B": ("rod", "arm", (0.6, 0.1, 0.0))}
+    ends["W"] = ("ground", "wheel", (-0.5, 0.0, 0.0))
+    armature = {"A": 0.05, "B": 0.0, "W": 0.02}
+    scene = Scene(
+        name="links",
+        gravity=(0.0, -GRAVITY, 0.0),
+        body=bodies,
+        joint=[hinge(name, *end, armature=armature[name]) for name, end in ends.items()],
+        coupling=[{"name": "s", "joints": [*ends], "ratios": [1.0, 1.0, -1.0]}],
+        load=[
+            {
+                "type": "torsion_spring",
+                "joint": "W",
+                "stiffness": 8.0,
+                "damping": 0.3,
+                "natural_angle": -14.0,
+            },
+            {"type": "torsion_spring", "joint": "B", "stiffness": 30.0, "damping": 0.1},
+        ],
+    )
+    rest = mbref.equilibria(scene)[0].scene
+    rod, arm, pin = (np.array(each) for each in (*(b.position for b in rest.body[:2]), rest.joint[1].anchor))
+    both = 8.0 - 0.7 * GRAVITY * (arm - pin)[1]
+    hessian = np.array([[8.0 - GRAVITY * (1.2 * rod[1] + 0.7 * arm[1]), both], [both, both + 30.0]])
+    found = mbref.equilibrium_sensitivities(rest, ["A.angle", "B.angle"], ["joint[B].anchor.x"])
+    assert_close(found.values[0, :, 0], np.linalg.solve(hessian, [0.0, 0.7 * GRAVITY]), 1e-9)
+
+
 def test_driven_linkage_that_accelerates_from_rest_is_not_in_equilibrium():
     """The driver turns the crank by t² rad: velocities are zero at the start, and accelerations are not."""
     scene = crank_linkage(ROCKER).with_(driver=[{"joint": "A", "polynomial": [0.0, 0.0, 1.0]}])
