@@ -93,6 +93,7 @@ def test_carts_latch_after_or_at_the_time_at_which_another_joint_lets_go(end):
     assert [event.time for event in motion.events if event.released == ("X",)] == [end]
     assert len(motion.events) == (1 if end == 0.1 else 2)
     judged = motion_by(natural_motion, scene, [0.0, 0.5], EXTENDED)
+    assert abs(judged.events[-1] - 0.1) <= ROUNDED
     for velocity in (motion.velocity, judged.velocity):
         assert np.abs(velocity[-1, :2, 0] + 0.25).max() <= ROUNDED
 
