@@ -97,6 +97,14 @@ class _Differentiated:
             rows.append((second[0] - first[0])[:n])
             drift.append((second[1] - first[1])[:n])
         mass = plant.CalcMassMatrix(context)[np.ix_(at, at)]
+        for coupling in self.scene.coupling:
+            one, other = self.tree.coupled(self.scene, coupling)
+            row = np.zeros(self.nv)
+            row[one], row[other] = -coupling.gear_ratio, 1.0
+            rows.append(row[None] + 0.0 * mass[:1])
+            drift.append(0.0 * mass[0, :1])
+        for i, inertia in self.tree.armatures(self.scene):
+            mass[i, i] += inertia
         return _Terms(mass, bias[at], np.concatenate(rows), np.concatenate(drift))
 
     def _end(self, plant: Any, context: Any, link: int, anchor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

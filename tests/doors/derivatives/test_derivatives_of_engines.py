@@ -10,6 +10,7 @@ from crosscheck.derivatives.cards import CARDS, Subject, verdicts
 from crosscheck.derivatives.mechanisms import MECHANISMS, SPATIAL
 from crosscheck.derivatives.records import read
 from crosscheck.engine import installed
+from crosscheck.engines.drake.adapter import ENGINE
 from mbref.records import rewrite
 from mbref.scene import Scene
 from tests.zoo.gradients import ENGINES
@@ -198,3 +199,12 @@ def test_mjxs_step_is_differentiated_right_and_leaves_out_a_term_of_the_exact_mo
     assert {row["by"] for row in own} == {"position", "velocity", "force"}
     assert max(row["error"] for row in own) <= 1e-6
     assert any(row["grade"] == "wrong" for row in found if row["truth"] == "judge")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not installed("drake"), reason="needs Drake")
+def test_drakes_terms_hold_a_gear_pair_in_a_loop_where_derivatives_are_taken():
+    """A plant without time step, whose terms are differentiated, has no constraints of its own."""
+    found = [*verdicts(ENGINE, ["couplings, closures", "couplings, virtual work"])]
+    assert [verdict.error is not None for verdict in found] == [True, False] * 2  # a cam is refused
+    assert not any(verdict.fails for verdict in found)
