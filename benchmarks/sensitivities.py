@@ -3,7 +3,8 @@
     python benchmarks/sensitivities.py
 
 prints for each scene the CPU time of one run. The CPU times of one output's derivatives to 1 and to 10
-numbers are multiples of it. Beside them stands the largest estimated error of a derivative over the largest
+numbers are multiples of it. A first call, which is not timed, finds the arrays of the scene and their
+derivatives. Beside them stands the largest estimated error of a derivative over the largest
 derivative.
 """
 

@@ -115,7 +115,7 @@ def moved_equilibrium(request: DerivativeRequest, step: float) -> MovedEquilibri
     if driven > AT_BALANCE:  # displacement in the scene's duration
         raise InputError(f"{name}: is not in equilibrium; a driver accelerates it")
     state = with_accelerations(state, rows)
-    found, f = tangents_at(model, state, rows, request.numbers, step), rows.basis.shape[2]
+    found, f = tangents_at(model, state, rows, request.numbers), rows.basis.shape[2]
     # a by (u, u', numbers), and a itself
     rates = np.concatenate([found.a[0], state.a.T], axis=1)[rows.partition.independent]
     stiffness = np.linalg.svd(rates[:, :f], compute_uv=False)

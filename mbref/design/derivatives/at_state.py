@@ -222,7 +222,7 @@ class _Blocks:
         self.rows = TangentRows(self.model, at, self.partition)
         self.at = with_accelerations(at, self.rows)
         self.own = len(request.scene.body)
-        tangents = tangents_at(self.model, self.at, self.rows, self.numbers, step)
+        tangents = tangents_at(self.model, self.at, self.rows, self.numbers)
         for number, is_open in zip(self.numbers, tangents.open, strict=True):
             if is_open:
                 raise InputError(f"{number.label}: the joints cannot stay closed if this number changes")

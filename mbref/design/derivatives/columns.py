@@ -79,7 +79,7 @@ def _angles(model: Model, states: States) -> np.ndarray:
 class Columns:
     """Columns (k, columns) of a motion as a function of its states."""
 
-    def __init__(self, motion: Motion, names: Sequence[str], step: float):
+    def __init__(self, motion: Motion, names: Sequence[str], step: float | np.ndarray):
         self.motion, self.names, self.step = motion, [*names], step
         self._has_reactions = any(quantity_of(name) in FORCES for name in names)
 

@@ -113,7 +113,7 @@ def _matrix(model: Model, q: np.ndarray, moved: MovedEquilibrium) -> np.ndarray:
     """Return K and C (2, f, f) of a model at rest at q (7 nb,), which may be off its equilibrium."""
     state, at = state_at_rest(model, q), moved.partition.independent
     rows = TangentRows(model, state, moved.partition)
-    found = tangents_at(model, with_accelerations(state, rows), rows, [], SECOND_PRECISION.step)
+    found = tangents_at(model, with_accelerations(state, rows), rows, [])
     by_place_and_rate = found.a[0][at] / model.units[at, None]
     return np.array(np.split(by_place_and_rate, 2, axis=1))
 

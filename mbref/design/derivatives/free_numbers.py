@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mbref.design.derivatives.numbers_of_scene import number_at, size_of_number
+from mbref.design.derivatives.numbers_of_scene import size_of_number
+from mbref.design.derivatives.paths_of_numbers import number_at
 from mbref.design.derivatives.sensitivities import refuse_repeats
 from mbref.design.derivatives.start_numbers import is_of_start
 from mbref.equations.model import Model

@@ -16,15 +16,14 @@ from mbref.design.derivatives.followed import Followed
 from mbref.design.derivatives.numbers_of_scene import (
     AccurateStencils,
     SceneNumber,
-    is_same_number,
-    scene_number,
-    unit_of_number,
+    scene_numbers,
 )
 from mbref.design.derivatives.panels import Precision, gauss
+from mbref.design.derivatives.paths_of_numbers import is_same_number, unit_of_number
 from mbref.design.derivatives.result import Sensitivities
 from mbref.design.derivatives.start_numbers import StartNumber, is_of_start, start_number
-from mbref.design.derivatives.states import States
-from mbref.design.derivatives.variational import VariationalEquations
+from mbref.design.derivatives.states import States, joined
+from mbref.design.derivatives.variational import Changes, VariationalEquations
 from mbref.equations.model import Model
 from mbref.equations.offsets import assembled
 from mbref.input_error import InputError
@@ -91,12 +90,13 @@ def sensitivities(
     """
     request = DerivativeRequest(find_scene(scene), of, to, times)
     limits = limits or Limits(rtol=RTOL)
-    first, run = request.solved(request.method, limits, FIRST_PRECISION)
+    first = request.solved(request.method, limits, FIRST_PRECISION)
     finer = replace(limits, rtol=max(FINEST, FINER * limits.rtol), atol=None)
     by = Method.parse(f"{SERIES_METHOD}[order={ORDER}]") if request.method.is_series else request.method
-    second, _ = request.solved(by, finer, SECOND_PRECISION, run)
+    second = request.solved(by, finer, SECOND_PRECISION, first.run)
+    found, finest = request.derivatives([first, second])
     request.model.release()
-    return compared(first, second, request)
+    return compared(found, finest, request)
 
 
 def motion_and_derivatives(
@@ -109,11 +109,12 @@ def motion_and_derivatives(
 ) -> tuple[Motion, list[str], np.ndarray]:
     """Return the motion at times (k,), s, the outputs' names, and their derivatives (k, outputs, numbers) up
     to a singular position, without an estimate of their errors. ``accurate`` are stencils of numbers that are
-    tried first, see ``scene_number``. Raises the errors of ``sensitivities``."""
+    tried first, see ``scene_numbers``. Raises the errors of ``sensitivities``."""
     request = DerivativeRequest(scene, of, to, times, accurate)
-    found, run = request.solved(request.method, limits, FIRST_PRECISION)
+    solution = request.solved(request.method, limits, FIRST_PRECISION)
+    (found,) = request.derivatives([solution])
     request.model.release()
-    return run.motion, found.outputs, found.values
+    return solution.run.motion, found.outputs, found.values
 
 
 def _refuse(scene: Scene, of: Sequence[str] | None, to: Sequence[str] | None) -> None:
@@ -150,6 +151,15 @@ class Derivatives(NamedTuple):
     rounding: np.ndarray
 
 
+class Solution(NamedTuple):
+    """A run, the step of differences of outputs, and the changes of its samples by numbers with labels."""
+
+    run: Followed
+    step: float
+    found: Changes
+    labels: list[str]
+
+
 class DerivativeRequest:
     """A scene's motion at samples (k,), s, its outputs, and the numbers by which it is differentiated."""
 
@@ -180,7 +190,7 @@ class DerivativeRequest:
         """The numbers that are fields of the scene."""
         fields = [label for label in self.labels if not is_of_start(label)]
         rest = self.model, NUMBER_STEP, self.accurate
-        return [scene_number(self.scene, label, *rest) for label in fields]
+        return scene_numbers(self.scene, fields, *rest)
 
     @cached_property
     def outputs(self) -> list[str]:
@@ -190,9 +200,8 @@ class DerivativeRequest:
 
     def solved(
         self, method: Method, limits: Limits, precision: Precision, before: Followed | None = None
-    ) -> tuple[Derivatives, Followed]:
-        """Return the derivatives of the outputs along a run by a method, and the run, which has the panels
-        of a run ``before``."""
+    ) -> Solution:
+        """Return a run by a method and its changes by the numbers; it has the panels of a run ``before``."""
         model, step = self.model, precision.step
         run = Followed.of(self.scene, model, method, limits, self.samples, gauss(precision.points), before)
         self.motion = self.motion or run.motion
@@ -200,26 +209,47 @@ class DerivativeRequest:
         of_start = [start_number(label, self.motion, model, run.first, step) for label in started]
         every: list[SceneNumber | StartNumber] = [*self.numbers, *of_start]
         starts = [(number.x, number.v) for number in every]
-        found = VariationalEquations(model, run, self.numbers, step).changes(starts)
-        columns, by_label = Columns(self.motion, self.outputs, step), {}
-        for number, along in zip(every, found.along, strict=True):
-            parts = [columns.along(model, found.states, along)]
-            if isinstance(number, SceneNumber):
-                parts.append(columns.by_number(number, found.states))
-            by_label[number.label] = np.sum(parts, axis=0)
-        values, rounding = np.stack([by_label[label] for label in self.labels], axis=-1)
-        signs = self._signs(self.outputs, found.states)[..., None]
-        return Derivatives(run.undecided_from, self.outputs, signs * values, rounding), run
+        found = VariationalEquations(model, run, self.numbers).changes(starts)
+        return Solution(run, step, found, [number.label for number in every])
 
-    def _signs(self, names: Sequence[str], states: States) -> np.ndarray:
-        """Return -1 for columns (k, outputs) of quaternions that have the other sign in the first motion."""
+    def derivatives(self, solutions: Sequence[Solution]) -> list[Derivatives]:
+        """Return the derivatives of the outputs of each solution; all are computed in common arrays."""
+        model, labels, numbers = self.model, solutions[0].labels, {n.label: n for n in self.numbers}
+        states, count = joined([each.found.states for each in solutions]), len(labels)
+        sizes = [len(each.found.states.times) for each in solutions]
+        steps = np.repeat([each.step for each in solutions], sizes)
+        along = [joined(each) for each in zip(*(s.found.along for s in solutions), strict=True)]
+        assert self.motion is not None
+        columns = Columns(self.motion, self.outputs, np.tile(steps, count))
+        both = columns.along(model, joined([states] * count), joined(along))
+        values, rounding = (part.reshape(count, sum(sizes), len(self.outputs)) for part in both)
+        for k, number in enumerate(map(numbers.get, labels)):
+            if number is not None:
+                own, rounded = columns.by_number(number, states)
+                values[k] += own
+                rounding[k] += rounded
+        signs = self._signs(self.outputs, states, sizes)[..., None]
+        order = [labels.index(label) for label in self.labels]
+        parts = [
+            np.split(part[order].transpose(1, 2, 0), np.cumsum(sizes)[:-1]) for part in (values, rounding)
+        ]
+        parts.insert(0, np.split(signs, np.cumsum(sizes)[:-1]))
+        return [
+            Derivatives(solution.run.undecided_from, self.outputs, sign * value, rounded)
+            for solution, sign, value, rounded in zip(solutions, *parts, strict=True)
+        ]
+
+    def _signs(self, names: Sequence[str], states: States, sizes: Sequence[int]) -> np.ndarray:
+        """Return -1 for columns (k, outputs) of quaternions that have the other sign in the first motion. The
+        states are of solutions with some first samples each, whose numbers are ``sizes``."""
         assert self.motion is not None
         k, model = states.times.size, self.model
         if not k:  # the motion meets a singular position before the first sample
             return np.ones((0, len(names)))
         arrays = states.q.reshape(k, -1, 7), states.v.reshape(k, -1, 6), states.a.reshape(k, -1, 6)
         own = model.motion(*arrays)["orientation"]
-        signs = np.where((own * self.motion.orientation[:k]).sum(axis=2) < 0.0, -1.0, 1.0)
+        first = np.concatenate([self.motion.orientation[:size] for size in sizes])
+        signs = np.where((own * first).sum(axis=2) < 0.0, -1.0, 1.0)
         bodies = {f"{name}.orientation": b for b, name in enumerate(self.motion.bodies)}
         places = [bodies.get(name.rpartition(".")[0]) for name in names]
         columns = [np.ones(k) if place is None else signs[:, place] for place in places]

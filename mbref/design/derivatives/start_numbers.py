@@ -54,7 +54,7 @@ def start_number(label: str, motion: Motion, model: Model, state: States, step: 
     f, units = rows.basis.shape[2], model.units
     if not f:
         raise InputError(f"{label}: drivers prescribe the whole motion, also at the start")
-    each = tangents_at(model, state, rows, [], step)
+    each = tangents_at(model, state, rows, [])
     x, v = each.x[0] * units[:, None], each.v[0] * units[:, None]
     columns, none = Columns(motion, [column], step), np.zeros((1, model.m))
     still = np.zeros((1, model.n))

@@ -7,22 +7,31 @@ n displacements determine the others; y = (u, w) are these f displacements and c
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
 
 from mbref.design.allowed_motions import TANGENT_RANK
+from mbref.design.derivatives.changes_of_scene import scene_changes
 from mbref.design.derivatives.numbers_of_scene import SceneNumber
-from mbref.design.derivatives.states import Residuals, States, terms_along
+from mbref.design.derivatives.states import States, terms_along
 from mbref.equations.model import Model
+from mbref.equations.tangent_solutions import (
+    PartitionAndUnits,
+    StatesAndRows,
+    TangentMemory,
+    compute_tangents,
+)
 from mbref.equations.units import row_lengths, unit_rows
+from mbref.kernels.named_memory import allocate, packed
 
 MASSLESS = 1e-13  # mass along a freedom / largest one, below which nothing resists: it does not accelerate
 # share of a number's effect on the constraints that no displacement compensates; accurate rows leave less
 COMPENSATED = 1e-7
 NOISE = 1e-12  # rounding of Φ, lengths of the mechanism or rad
-MOST_ENTRIES = 500_000  # numbers at states that are computed together: 4 MB, which caches hold
+MOST_ENTRIES = 2_000_000  # numbers at states that are computed together: 16 MB
 
 
 class RowPartition(NamedTuple):
@@ -48,7 +57,7 @@ def _pivots(matrix: np.ndarray) -> np.ndarray:
     """Return the indices (r,) of columns of a matrix (r, c) that span it best."""
     if not matrix.size:
         return np.zeros(0, dtype=int)
-    return np.sort(scipy.linalg.qr(matrix, mode="r", pivoting=True)[1][: len(matrix)])
+    return np.sort(scipy.linalg.qr(matrix, mode="r", pivoting=True)[1][: len(matrix)]).astype(int)
 
 
 def tangent_ranks(model: Model, states: States) -> list[int]:
@@ -74,6 +83,24 @@ class TangentRows:
         self.basis[:, partition.independent] = np.eye(len(partition.independent))
         self.mass = (self.terms.mass * model.units**2)[:, None]
 
+    def packed(self, states: States) -> dict[str, StatesAndRows | PartitionAndUnits]:
+        """Return the states, and these rows, as arrays of ``TangentMemory``."""
+        f, r = self.basis.shape[2], len(self.partition.rows)
+        compliance = np.zeros((len(states.times), f, f)) if self.model.kinematic else self._inverse_mass
+        count, n = self.basis.shape[:2]
+        arrays = (
+            self.inverse.reshape(count * r, r),
+            self.basis.reshape(count * n, f),
+            compliance.reshape(count * f, f),
+        )
+        given = states.times, states.q, states.v, states.angles, states.a, states.multipliers, self._lengths
+        has_mass = np.array([not self.model.kinematic], dtype=np.int64)
+        own = *self.partition, self.units, self.mass[:, 0], has_mass
+        return {
+            "states": StatesAndRows(*map(np.ascontiguousarray, (*given, *arrays))),
+            "partition": PartitionAndUnits(*map(np.ascontiguousarray, own)),
+        }
+
     def placed(self, rhs: np.ndarray) -> np.ndarray:
         """Return x (k, n, c) with Φ_q S x = rhs (k, m, c), zero at the independent displacements."""
         x = np.zeros((len(rhs), self.model.n, rhs.shape[2]))
@@ -81,24 +108,18 @@ class TangentRows:
         x[:, self.partition.dependent] = self.inverse @ unit[:, self.partition.rows]
         return x
 
-    def open(self, x: np.ndarray, rhs: np.ndarray, rounding: np.ndarray) -> np.ndarray:
-        """Return which columns x (k, n, c) of ``placed`` do not compensate rhs (k, m, c), whose entries have
-        a rounding (c,)."""
-        unit = rhs / self._lengths[..., None]
-        rest = np.abs(unit - self._unit @ x).max(axis=(0, 1), initial=0.0)
-        return np.asarray(rest > COMPENSATED * np.abs(unit).max(axis=(0, 1), initial=0.0) + rounding)
-
     def solve(self, rhs: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return a (k, n, c) and λ (k, m, c), zero for dependent rows, with Φ_q a = rhs (k, m, c) and
         M a + Φ_qᵀ λ = force (k, n, c)."""
         pushed, a = force * self.units[:, None], self.placed(rhs)
         multipliers = np.zeros_like(rhs)
         if not self.model.kinematic:
-            a = a + self.basis @ (self._inverse_mass() @ (self.basis.mT @ (pushed - self.mass * a)))
+            a = a + self.basis @ (self._inverse_mass @ (self.basis.mT @ (pushed - self.mass * a)))
             parts = self.inverse.mT @ (pushed - self.mass * a)[:, self.partition.dependent]
             multipliers[:, self.partition.rows] = parts
         return a * self.units[:, None], multipliers / self._lengths[..., None]
 
+    @cached_property
     def _inverse_mass(self) -> np.ndarray:
         """Return inverses (k, f, f) of the mass matrices of the freedoms; one without mass has none."""
         matrices = self.basis.mT @ (self.mass * self.basis)
@@ -127,26 +148,17 @@ class Tangents(NamedTuple):
     open: np.ndarray
 
 
-def tangents_at(
-    model: Model, states: States, rows: TangentRows, numbers: Sequence[SceneNumber], step: float
-) -> Tangents:
-    """Return the tangents at states with accelerations; ``step`` is the length of differences, see
-    ``Direction.steps``."""
-    k, m, residuals, units = len(states.times), model.m, Residuals(model, states), model.units
-    basis, f = rows.basis, rows.basis.shape[2]
-    own = np.zeros((k, 3 * m + model.n, len(numbers)))
-    for j, number in enumerate(numbers):
-        own[..., j] = residuals.of_terms(*number.changed_terms(states))
-    placed = rows.placed(-own[:, :m])
+def tangents_at(model: Model, states: States, rows: TangentRows, numbers: Sequence[SceneNumber]) -> Tangents:
+    """Return the tangents at states with accelerations."""
+    sizes = {**model.sizes, "k": len(states.times), "r": len(rows.partition.rows)}
+    sizes |= {"free": len(rows.partition.independent), "numbers": len(numbers)}
+    sizes["c"] = count = 2 * sizes["free"] + len(numbers)
+    memory = allocate(TangentMemory, sizes, **rows.packed(states), numbers=scene_changes(numbers, model))
+    equations = model.memory
+    before = equations.values.angles.copy()
+    compute_tangents(sizes["free"], packed(memory).argument, equations.packed.argument)
+    equations.values.angles[:] = before
+    found = memory.found
     noise = NOISE * np.array([np.abs(number.weights).max() for number in numbers])
-    opened = rows.open(placed, -own[:, :m], noise)
-    x = np.concatenate([basis, np.zeros_like(basis), placed], axis=2)
-    changed = np.concatenate([np.zeros((k, len(own[0]), 2 * f)), own], axis=2)
-    for j in np.flatnonzero(x.any(axis=(0, 1))).tolist():
-        changed[..., j] += residuals.along(x[..., j] * units, step)
-    v = rows.placed(-changed[:, m : 2 * m])
-    v[..., f : 2 * f] = basis
-    for j in np.flatnonzero(v.any(axis=(0, 1))).tolist():
-        changed[..., j] += residuals.by_velocity(v[..., j] * units)
-    a, multipliers = rows.solve(-changed[:, 2 * m : 3 * m], -changed[:, 3 * m :])
-    return Tangents(x, v, a, multipliers, opened)
+    x, v, a, multipliers = (part.reshape(len(states.times), count, part.shape[1]).mT for part in found[:4])
+    return Tangents(x, v, a, multipliers, found.rest > COMPENSATED * found.largest + noise)

@@ -34,8 +34,8 @@ class Changes(NamedTuple):
 class VariationalEquations:
     """The variational equations of a followed run of a model by numbers of its scene."""
 
-    def __init__(self, model: Model, run: Followed, numbers: Sequence[SceneNumber], step: float):
-        self.model, self.run, self.numbers, self.rule, self.step = model, run, numbers, run.rule, step
+    def __init__(self, model: Model, run: Followed, numbers: Sequence[SceneNumber]):
+        self.model, self.run, self.numbers, self.rule = model, run, numbers, run.rule
         self.freedoms = len(run.partitions[0].independent) if run.partitions else 0
 
     def changes(self, starts: Sequence[StartChange]) -> Changes:
@@ -85,7 +85,7 @@ class VariationalEquations:
             for part in (places[k : k + size] for k in range(0, places.size, size)):
                 rows = TangentRows(model, own := states.at(part), partition)
                 own = with_accelerations(own, rows)
-                found = tangents_at(model, own, rows, self.numbers, self.step)
+                found = tangents_at(model, own, rows, self.numbers)
                 for number, is_open in zip(self.numbers, found.open, strict=True):
                     if is_open:
                         raise InputError(
