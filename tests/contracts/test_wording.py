@@ -15,7 +15,7 @@ def test_list_is_joined_by_commas_and_the_word_and():
     [
         (6.04e-9, 1e-14, "6.1e-9"),
         (6.0e-9, 6.0e-9, "6.0e-9"),
-        (9.91e-9, 0.0, "10.0e-9"),
+        (9.91e-9, 0.0, "1.0e-8"),
         (0.0, 0.0, "0"),
         (5e-15, 3e-14, "less than the truth's own bound, 3e-14"),
     ],
