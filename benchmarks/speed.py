@@ -182,11 +182,11 @@ def _is_worth_timing(run: Run, curves: dict[Curve, list[Run]]) -> bool:
         return False
     if run.engine in (OURS, LIMIT_NAME):
         return True
-    kind = _integrator(run.engine, run.family)
+    kind = owner_of_integrator(run.engine, run.family)
     rivals = [
         _costs(runs)
         for curve, runs in curves.items()
-        if curve[0] == run.engine and _integrator(*curve) == kind
+        if curve[0] == run.engine and owner_of_integrator(*curve) == kind
     ]
     best = [min(costs) for costs in zip(*rivals, strict=True)]
     return any(cost < NEAR * least for cost, least in zip(_costs(own), best, strict=True))
@@ -255,10 +255,10 @@ def chosen(table: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _kind(row: dict[str, Any]) -> tuple[str, str]:
-    return row["engine"], _integrator(row["engine"], row["family"])
+    return row["engine"], owner_of_integrator(row["engine"], row["family"])
 
 
-def _integrator(name: str, family: str) -> str:
+def owner_of_integrator(name: str, family: str) -> str:
     """Return the owner of a family's integrator."""
     if name not in ENGINES or family not in engine(name).integrated_here:
         return OWN
@@ -298,7 +298,7 @@ def summary(console: Console, tables: dict[str, Sequence[dict[str, Any]]]) -> No
         for whose, belongs in OURSELVES.items():
             mine = [row for row in _of(table, (OURS,)) if belongs(row["family"])]
             pairs = zip(others, _best(mine) * len(OPPONENTS), strict=True)
-            shown.add_row(scene, whose, *(_advantage(theirs, ours) for theirs, ours in pairs))
+            shown.add_row(scene, whose, *(advantage(theirs, ours) for theirs, ours in pairs))
     console.print(shown)
 
 
@@ -335,7 +335,7 @@ def _ms(seconds: float) -> str:
     return "–" if not math.isfinite(seconds) else f"{seconds * 1e3:.3g}"
 
 
-def _advantage(theirs: float, ours: float) -> str:
+def advantage(theirs: float, ours: float) -> str:
     if math.isinf(theirs) and math.isfinite(ours):
         return "alone"  # no other reaches that error
     return _multiple(theirs / ours) if math.isfinite(ours) else "–"
