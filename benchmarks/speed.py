@@ -182,11 +182,11 @@ def _is_worth_timing(run: Run, curves: dict[Curve, list[Run]]) -> bool:
         return False
     if run.engine in (OURS, LIMIT_NAME):
         return True
-    kind = owner_of_integrator(run.engine, run.family)
+    kind = _integrator(run.engine, run.family)
     rivals = [
         _costs(runs)
         for curve, runs in curves.items()
-        if curve[0] == run.engine and owner_of_integrator(*curve) == kind
+        if curve[0] == run.engine and _integrator(*curve) == kind
     ]
     best = [min(costs) for costs in zip(*rivals, strict=True)]
     return any(cost < NEAR * least for cost, least in zip(_costs(own), best, strict=True))
@@ -255,10 +255,10 @@ def chosen(table: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _kind(row: dict[str, Any]) -> tuple[str, str]:
-    return row["engine"], owner_of_integrator(row["engine"], row["family"])
+    return row["engine"], _integrator(row["engine"], row["family"])
 
 
-def owner_of_integrator(name: str, family: str) -> str:
+def _integrator(name: str, family: str) -> str:
     """Return the owner of a family's integrator."""
     if name not in ENGINES or family not in engine(name).integrated_here:
         return OWN
@@ -294,22 +294,25 @@ def summary(console: Console, tables: dict[str, Sequence[dict[str, Any]]]) -> No
         for level in ERROR_LEVELS:
             shown.add_column(f"{name} {level:.0e}", justify="right")
     for scene, table in tables.items():
-        others = [cost for names, kinds in OPPONENTS.values() for cost in _best(_of(table, names, kinds))]
+        others = [
+            cost for names, kinds in OPPONENTS.values() for cost in least_costs(rows_of(table, names, kinds))
+        ]
         for whose, belongs in OURSELVES.items():
-            mine = [row for row in _of(table, (OURS,)) if belongs(row["family"])]
-            pairs = zip(others, _best(mine) * len(OPPONENTS), strict=True)
+            mine = [row for row in rows_of(table, (OURS,)) if belongs(row["family"])]
+            pairs = zip(others, least_costs(mine) * len(OPPONENTS), strict=True)
             shown.add_row(scene, whose, *(advantage(theirs, ours) for theirs, ours in pairs))
     console.print(shown)
 
 
-def _of(
+def rows_of(
     table: Sequence[dict[str, Any]], names: Sequence[str], kinds: Sequence[str] = ()
 ) -> list[dict[str, Any]]:
     """Return the rows of these engines, and of these kinds of integrators if kinds are named."""
     return [row for row in table if row["engine"] in names and (not kinds or _kind(row)[1] in kinds)]
 
 
-def _best(rows: Sequence[dict[str, Any]]) -> list[float]:
+def least_costs(rows: Sequence[dict[str, Any]]) -> list[float]:
+    """Return the least cost (s) of some rows at each error, NaN without rows."""
     costs = [row["cost"] for row in rows]
     return [min(level) for level in zip(*costs, strict=True)] if costs else [math.nan] * len(ERROR_LEVELS)
 

@@ -11,67 +11,60 @@ from __future__ import annotations
 import json
 import math
 from argparse import ArgumentParser
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
-from speed import ENGINES, LIMIT_NAME, OURS, OWN, SERIES, advantage, owner_of_integrator
+from speed import OPPONENTS, OURS, OURSELVES, advantage, least_costs, rows_of
 
-Costs = dict[tuple[str, str], list[float]]  # by engine and family, seconds at the three errors
-Chosen = Callable[[str, str], bool]  # whether a family of an engine belongs to a group
+Rows = Sequence[dict[str, Any]]  # families with engine and costs (s) at the three errors
+Group = Callable[[Rows], Rows]
 LEVELS = ("1e-3", "1e-6", "1e-9")
 
 
-def series(engine: str, family: str) -> bool:
-    """Whether a family is mbref's series, with or without generated code."""
-    return engine == OURS and family.startswith(SERIES)
+def opponents(name: str) -> Group:
+    """Return the group of opponents of this name."""
+    return lambda rows: rows_of(rows, *OPPONENTS[name])
 
 
-def dual(engine: str, family: str) -> bool:
-    """Whether a family is mbref's sparse method."""
-    return engine == OURS and family.startswith("alf-dual")
-
-
-def engines(engine: str, family: str) -> bool:
-    """Whether a family is an engine's, by any integrator."""
-    return engine in ENGINES[1:4]
-
-
-def own_integrators(engine: str, family: str) -> bool:
-    """Whether a family is an engine's by its own integrator."""
-    return engines(engine, family) and owner_of_integrator(engine, family) == OWN
-
-
-def of(name: str) -> Chosen:
+def engine(name: str) -> Group:
     """Return the group of all families of an engine."""
-    return lambda engine, family: engine == name
+    return lambda rows: rows_of(rows, (name,))
 
 
-TABLES: tuple[tuple[str, tuple[tuple[str, Chosen, Chosen], ...]], ...] = (
-    ("Against the engines", (("`taylor`", engines, series), ("`alf-dual`", engines, dual))),
+def ours(belongs: Callable[[str], bool]) -> Group:
+    """Return the group of mbref's families whose names pass a test."""
+    return lambda rows: [row for row in rows_of(rows, (OURS,)) if belongs(row["family"])]
+
+
+SERIES = ours(OURSELVES["series"])
+DUAL = ours(lambda family: family.startswith("alf-dual"))
+TABLES: tuple[tuple[str, tuple[tuple[str, Group, Group], ...]], ...] = (
+    (
+        "Against the engines",
+        (("`taylor`", opponents("engines"), SERIES), ("`alf-dual`", opponents("engines"), DUAL)),
+    ),
     (
         "Against the engines' own integrators, and the limit",
-        (("own integrators / mbref", own_integrators, series), ("mbref / limit", series, of(LIMIT_NAME))),
+        (
+            ("own integrators / mbref", opponents("own integrators"), SERIES),
+            ("mbref / limit", SERIES, opponents("limit")),
+        ),
     ),
-    ("Against generated code", (("CasADi", of("casadi"), series), ("heyoka", of("heyoka"), series))),
+    ("Against generated code", (("CasADi", engine("casadi"), SERIES), ("heyoka", engine("heyoka"), SERIES))),
 )
 
 
-def least(costs: Costs, group: Chosen) -> list[float]:
-    """Return the least cost (s) of a group at each error."""
-    rows = [cost for name, cost in costs.items() if group(*name)]
-    return [min((row[level] for row in rows), default=math.inf) for level in range(len(LEVELS))]
-
-
-def read(paths: Iterable[Path]) -> dict[str, Costs]:
-    """Return the costs of each scene."""
-    found = {}
-    for path in paths:
-        for scene, stored in json.loads(path.read_text(encoding="utf-8"))["scenes"].items():
-            found[scene] = {
-                (curve["engine"], curve["family"]): [math.inf if c is None else c for c in curve["cost"]]
-                for curve in stored["curves"]
-            }
-    return found
+def read(paths: Iterable[Path]) -> dict[str, Rows]:
+    """Return the families of each scene with their costs, infinite where a family misses an error."""
+    return {
+        scene: [
+            {**curve, "cost": [math.inf if cost is None else cost for cost in curve["cost"]]}
+            for curve in stored["curves"]
+        ]
+        for path in paths
+        for scene, stored in json.loads(path.read_text(encoding="utf-8"))["scenes"].items()
+    }
 
 
 def main() -> None:
@@ -82,8 +75,8 @@ def main() -> None:
     for title, columns in TABLES:
         heads = [f"{name}: at {LEVELS[0]} | " + " | ".join(LEVELS[1:]) for name, _, _ in columns]
         print(f"\n{title}\n\n| scene | {' | '.join(heads)} |\n|---|{'--:|' * 3 * len(columns)}")
-        for scene, costs in scenes.items():
-            pairs = [(least(costs, a), least(costs, b)) for _, a, b in columns]
+        for scene, rows in scenes.items():
+            pairs = [(least_costs(above(rows)), least_costs(below(rows))) for _, above, below in columns]
             cells = [advantage(a, b) for above, below in pairs for a, b in zip(above, below, strict=True)]
             print(f"| `{scene}` | {' | '.join(cells)} |")
 
