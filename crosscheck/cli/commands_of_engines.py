@@ -64,7 +64,7 @@ def add_derivatives(commands: Commands) -> None:
         "and wrong about the exact motion. An error up to 1e-6 of the largest derivative is right, up to "
         "1e-2 rough. Loads are left out, and drivers refused. A sentence says whether an error depends on "
         "open loops, on velocities, or on neither. Without ENGINE and SCENE the stored results are shown; "
-        "--run measures engines and stores them. --cards asks identities instead, which need no other "
+        "--run measures engines and stores them. --cards asks for identities, which need no other "
         "derivatives: closures and virtual work at neighbouring states, the chain rule along the motion, "
         "energy, the engine's own differences, frames, units, order, redundant rows, speed and couplings. "
         "Exit status: 1 if a derivative of a named engine or scene is wrong, or a card fails"

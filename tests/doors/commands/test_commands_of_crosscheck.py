@@ -430,7 +430,7 @@ def test_compare_does_not_judge_an_adapter_that_loses_a_spring(capsys, tmp_path)
 
 
 def test_compare_tries_every_family_before_it_says_that_an_engine_completes_no_run(capsys, still):
-    """Of four families only the fourth completes its run. With the first family alone no run completes."""
+    """The fourth of four families alone completes its run. With only the first one no run completes."""
     status, out, _ = run_main(capsys, "compare", still, "--engine", f"{FAKES}:LAST_ONE_RUNS")
     assert status == 0 and "last is right at its best settings" in out and "fourth" in out, out
     asked = ("--engine", f"{FAKES}:LAST_ONE_RUNS", "--setting", "first")

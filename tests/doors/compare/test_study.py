@@ -117,7 +117,7 @@ def test_run_in_a_child_gives_the_record_of_a_run_here():
 
 @pytest.mark.slow
 def test_cluster_or_pool_of_two_workers_gives_the_records_of_a_serial_study(one_after_the_other, tmp_path):
-    """Returned and stored records equal those of one thread here, except for times; the last run crashes."""
+    """Returned and stored records equal records of one thread, except for times; the last run crashes."""
     from distributed import Client, LocalCluster
 
     path = tmp_path / "records.jsonl"

@@ -337,7 +337,7 @@ def test_pinocchios_compiled_family_gives_the_true_motion(pinocchio: Engine, nam
 @pytest.mark.parametrize("family", ["dop853, compiled", "tuned, compiled"])
 def test_pinocchios_compiled_families_move_and_react_by_gauss_s_principle(pinocchio, family):
     """The scene has seven types of joints and torsion springs, the only loads of these families. Differences
-    are at most ten times those of MuJoCo's families (GAUSS), whose steps have ten times the tolerance."""
+    are at most ten times the errors of MuJoCo's (GAUSS), whose steps have ten times the tolerance."""
     joints = every_joint()
     springs = [load for load in joints.load if load.type == "torsion_spring"]
     assert springs

@@ -95,7 +95,7 @@ def error(run: Trajectory) -> float:
 @pytest.mark.parametrize("name", FREE)
 def test_block_on_an_incline_moves_and_reacts_as_its_closed_form(name: str, bodies: tuple[str, str]) -> None:
     """The centre falls along the plane, the block spins about the normal. The reaction is -m (g · n) n, of 18
-    N, with the moment at the anchor by Euler's equations. Errors are at most ten times those of MEASURED."""
+    N, with the moment at the anchor by Euler's equations. Errors are at most ten times MEASURED."""
     run = run_fine(name, incline(bodies), TIMES)
     assert error(run) < CLOSE[name]
     assert np.abs(run.reactions["plane0"] - exact_wrenches(bodies)).max() < MARGIN * MEASURED[name][1]

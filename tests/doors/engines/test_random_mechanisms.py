@@ -45,7 +45,7 @@ def test_engines_accelerate_random_mechanisms_as_mbref(seeds):
 
 
 def test_random_mechanisms_have_every_joint_type_and_up_to_three_loops():
-    """Mechanisms of 40 seeds have 3 to 8 bodies; loops are joints beyond those of a spanning tree."""
+    """Mechanisms of 40 seeds have 3 to 8 bodies; each joint that a spanning tree leaves out closes a loop."""
     scenes = [random_mechanism(seed) for seed in range(40)]
     kinds = Counter(joint.type for scene in scenes for joint in scene.joint)
     assert set(kinds) == set(KINDS), f"no {set(KINDS) - set(kinds)}"

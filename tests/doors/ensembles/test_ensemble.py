@@ -100,8 +100,8 @@ def test_random_numbers_of_variants_have_the_requested_distributions():
 
 
 def test_variant_depends_on_its_seed_and_number_alone_and_differs_in_nothing_else():
-    """The first ten of twenty variants are those of a request for ten. Each has two new numbers, those of
-    VARY; with the old ones put back it equals the original."""
+    """The first ten of twenty variants equal ten variants of a request for ten. Each variant has two new
+    numbers, which VARY names; with the old numbers put back it equals the original."""
     scenes = list(variants(DRIVEN, VARY, 20, seed=3))
     old = DRIVEN.joint_named("B").anchor[0], DRIVEN.body[2].mass
     for s in scenes:
