@@ -50,8 +50,9 @@ def case(item: pytest.Item) -> str:
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:
-    """Mark the cases that slow.toml lists."""
-    if any(fnmatchcase(case(item), pattern) for pattern in patterns(item)):
+    """Mark the cases that slow.toml lists, without those of patterns that begin with an exclamation mark."""
+    listed = [pattern for pattern in patterns(item) if fnmatchcase(case(item), pattern.removeprefix("!"))]
+    if listed and not any(pattern.startswith("!") for pattern in listed):
         item.add_marker(pytest.mark.slow)
 
 
@@ -68,7 +69,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         f"{file}::{name}[{pattern}]"
         for (file, name), cases in found.items()
         for pattern in SLOW.get(file, {}).get(name, [])
-        if not any(fnmatchcase(each, pattern) for each in cases) and not names_missing_engine(pattern)
+        if not any(fnmatchcase(each, pattern.removeprefix("!")) for each in cases)
+        and not names_missing_engine(pattern)
     ]
     if wrong:
         raise pytest.UsageError(f"tests/slow.toml lists cases that do not exist: {', '.join(wrong)}")
