@@ -44,8 +44,11 @@ STILL = {"velocity": None, "angular_velocity": None}
 @dataclass(frozen=True)
 class Row:
     """The error of one block of derivatives, by an engine's function at a state, relative to the block's
-    largest entry; ``worst`` is the coordinate, or the component of a body's acceleration, that is most off.
-    ``uncertain`` is the error of the truth, too large where the engine's accelerations have a kink."""
+    largest entry, or to what moves a body by its displacement in the scene's duration.
+
+    ``worst`` is the coordinate, or the component of a body's acceleration, that is most off. ``uncertain`` is
+    the error of the truth, too large where the engine's accelerations have a kink.
+    """
 
     engine: str
     version: str
@@ -96,7 +99,7 @@ def rows(engine: Engine, scene: Scene) -> Iterator[Row]:
             by_number = engine.own_number_derivatives(at, function, numbers)
             if by_number is not None:
                 sizes = np.array([abs(number_at(at, number)) for number in numbers])
-                least = float(np.abs(judged.by_position).max(initial=0.0))
+                least = float(np.abs(judged.by_position).max(initial=at.duration**-2.0))
                 error, worst, _ = _error(by_number * sizes, judged.by_number * sizes, _components(at), least)
                 yield Row(*source, state, JUDGE, NUMBER, error, worst)
         first = next(iter(states))
@@ -122,9 +125,10 @@ def _at(
         tangent = TangentDerivatives(
             judged.basis, found.by_position @ turned, found.by_velocity @ turned, found.by_force
         )
-    size = float(np.abs(judged.by_position).max(initial=0.0)) ** 0.5
+    slow = 1 / scene.duration
+    size = float(np.abs(judged.by_position).max(initial=slow**2)) ** 0.5
     for by, own, true, least in (
-        (POSITION, tangent.by_position, judged.by_position, 0.0),
+        (POSITION, tangent.by_position, judged.by_position, slow**2),
         (VELOCITY, tangent.by_velocity, judged.by_velocity, size),
         (FORCE, tangent.by_force, judged.by_force, 0.0),
     ):
@@ -176,19 +180,19 @@ def _by_differences(found: OwnDerivatives, source: Source, scene: Scene) -> Iter
         VELOCITY: (found.by_velocity, lambda x: found.own(nothing, v + x, nothing), (speed,), sizes),
         FORCE: (found.by_force, lambda x: found.own(nothing, v, x), (1.0,), 1 / sizes),
     }
-    size = 0.0
+    size = scene.duration**-2.0
     for name, (own, function, steps, units) in ways.items():
         if own is None:
             continue
         many = [slopes(function, step * units) / step for step in (*steps, steps[-1] / FINER)]
         apart = [float(np.abs(a - b).max(initial=0.0)) for a, b in itertools.pairwise(many)]
         best = int(np.argmin(apart))
-        least = size**0.5 if name == VELOCITY else 0.0
+        least = {POSITION: size, VELOCITY: size**0.5}.get(name, 0.0)
         error, worst, scale = _error(
             (own * units / sizes[:, None]).T, many[best + 1], found.coordinates, least
         )
         yield Row(*source, OWN, name, error, worst, apart[best] / scale)
-        size = scale
+        size = scale if name == POSITION else size
 
 
 class Allowed(Protocol):

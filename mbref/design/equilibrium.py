@@ -12,6 +12,7 @@ from mbref.design.balance import ONE_POSE, Newton, are_one, balanced
 from mbref.design.falling import fallen
 from mbref.design.joint_angles import slots
 from mbref.design.linearisation import Tangent, multipliers, unsteady
+from mbref.design.meeting_ends import refuse_meeting_ends
 from mbref.design.stability import eigenvalues_of, linear_at
 from mbref.design.starts import starts_from
 from mbref.design.turning import Turning, turning
@@ -135,7 +136,8 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
     Raises
     ------
     SceneError
-        If a body has no mass, a driver or a load moves otherwise, or the mechanism has no degree of freedom.
+        If a body has no mass, a driver or a load moves otherwise, the mechanism has no degree of freedom, or
+        the ends of a damped spring meet and can part in more than one direction.
     """
     scene = assembled(find_scene(scene))
     refuse_conflict(scene)
@@ -271,6 +273,7 @@ def _equilibrium(found: Newton, singular: bool, freedoms: int) -> Equilibrium:
     if singular or tangent.freedoms != freedoms:
         none = np.zeros(0, dtype=complex)
         return Equilibrium(placed, none, np.zeros((0, count, 6), dtype=complex), {}, tangent.frame.rate)
+    refuse_meeting_ends(model, tangent.q, tangent.basis, "small motions are not linear")
     eigenvalues = eigenvalues_of(linear_at(tangent, found.directions.T @ found.away()))
     blocks = model.terms(np.zeros(1), q, angles=angles).blocks
     forces = reactions(model, q, blocks, multipliers(tangent)[None], angles)

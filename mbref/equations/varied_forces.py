@@ -63,6 +63,25 @@ def vary_force(k, t, freedoms, varied, numbers, equations):
 
 
 @kernel
+def vary_meeting_ends(k, u, v, between, freedoms, varied, numbers, equations):
+    """Add the changes of minus the forces of a spring whose ends, at u and v, meet. They are stiffness times
+    the distance d, and damping times its rate, which holds for ends that part along one line."""
+    loads, changes = equations.scene.loads, numbers.loads
+    i, j, stiffness, damping = loads.first[k], loads.second[k], loads.stiffness[k], loads.damping[k]
+    force = scale(damping, between[1])
+    add_opposite_forces(i, j, u[0], v[0], between[0], force, varied)
+    for d in range(varied.x.shape[0]):
+        n = d - 2 * freedoms
+        du = changed_vector(i, d, 1, u, changes.point_first, k, n, varied, equations)
+        dv = changed_vector(j, d, 1, v, changes.point_second, k, n, varied, equations)
+        gap = between_changes(i, j, d, du, dv, varied)
+        moved = add(scale(stiffness, gap[0]), scale(damping, gap[1]))
+        if n >= 0:
+            moved = add(moved, scale(changes.damping[n, k], between[1]))
+        add_change_of_forces(i, j, d, (u[0], v[0]), (add(du[0], gap[0]), dv[0]), force, moved, varied)
+
+
+@kernel
 def vary_spring(k, t, freedoms, varied, numbers, equations):
     """Add the changes of minus the forces along a line of two points, or along the axis of a joint."""
     loads, changes = equations.scene.loads, numbers.loads
@@ -79,6 +98,7 @@ def vary_spring(k, t, freedoms, varied, numbers, equations):
     if is_spring:
         length = sqrt(dot(between[0], between[0]))
         if not length > 0.0:
+            vary_meeting_ends(k, u, v, between, freedoms, varied, numbers, equations)
             return
         a = scale(1.0 / length, between[0]), NOTHING, NOTHING
         rate = dot(a[0], between[1])

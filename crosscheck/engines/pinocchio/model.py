@@ -27,6 +27,7 @@ from crosscheck.engines.shared.spanning_tree import (
     Tree,
     spanning_tree,
 )
+from crosscheck.engines.shared.spring_force import spring_force
 from mbref.scene import Force, JointLoad, Moment, Scene, Spring
 from mbref.scene.loads import Action
 
@@ -223,11 +224,7 @@ class Loads:
         frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         first, second = (data.oMi[j].act(point.translation) for j, point in ends)
         rates = [pin.getFrameVelocity(self.model, data, j, point, frame).linear for j, point in ends]
-        along = second - first
-        length = np.sqrt(along @ along)
-        along = along / length
-        rate = along @ (rates[1] - rates[0])
-        return (spring.stiffness * (length - spring.natural_length) + spring.damping * rate) * along
+        return spring_force(spring, second - first, rates[1] - rates[0])
 
 
 def _turns_about_one_direction(tree: Tree, link: int) -> bool:

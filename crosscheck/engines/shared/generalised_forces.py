@@ -11,6 +11,7 @@ import numpy as np
 
 from crosscheck.engines.shared.constraint_equations import Frames
 from crosscheck.engines.shared.geometry import in_body, joint_frame, point_in_body
+from crosscheck.engines.shared.spring_force import spring_force
 from crosscheck.judge.constraints import inertia_matrices
 from mbref.rotations import cross
 from mbref.scene import Force, Moment, Scene, Spring, TorsionSpring
@@ -122,7 +123,4 @@ def _tension(f: Frames, spring: Spring, ends: list[tuple[int, np.ndarray]]) -> n
     """Return the world force (…, 3, 1) of a spring on its first body."""
     p, q = (f.r[..., b, :, :] + f.a[..., b, :, :] @ s for b, s in ends)
     u, v = (f.v[..., b, :, :] + f.a1[..., b, :, :] @ s for b, s in ends)
-    length = np.sqrt(np.sum((q - p) ** 2, axis=-2, keepdims=True))
-    along = (q - p) / length
-    rate = np.sum((v - u) * along, axis=-2, keepdims=True)
-    return (spring.stiffness * (length - spring.natural_length) + spring.damping * rate) * along
+    return spring_force(spring, (q - p)[..., 0], (v - u)[..., 0])[..., None]

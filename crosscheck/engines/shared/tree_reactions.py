@@ -14,6 +14,7 @@ import numpy as np
 
 from crosscheck.engines.shared.sampling import UNKNOWN, Sample
 from crosscheck.engines.shared.spanning_tree import GROUND_LINK, Tree
+from crosscheck.engines.shared.spring_force import spring_force
 from crosscheck.judge.loads import at_time
 from crosscheck.judge.time_functions import value
 from mbref import rotations
@@ -159,10 +160,8 @@ def _applied(scene: Scene, tree: Tree, motion: LinkMotion, load: Load) -> list[t
     if isinstance(load, Spring):
         links = [tree.link_of(scene.body_index(name)) for name in load.bodies]
         (p, u), (q, v) = (_point(tree, motion, k, x) for k, x in zip(links, load.points, strict=True))
-        length = np.linalg.norm(q - p)
-        along = (q - p) / length
-        tension = load.stiffness * (length - load.natural_length) + load.damping * (v - u) @ along
-        return [(links[0], wrench(tension * along, p)), (links[1], wrench(-tension * along, q))]
+        force = spring_force(load, q - p, v - u)
+        return [(links[0], wrench(force, p)), (links[1], wrench(-force, q))]
     raise TypeError(f"no wrench of a load of type {load.type!r}")
 
 

@@ -21,7 +21,7 @@ from crosscheck.engines.shared.spanning_tree import GROUND_LINK
 from crosscheck.engines.shared.tree_reactions import LinkMotion, sample_of, wrench
 from crosscheck.engines.simbody.model import SUPPORTS, Mechanism
 from mbref.motions.trajectory import Outcome, Trajectory
-from mbref.scene import Scene
+from mbref.scene import Scene, Spring
 
 INTEGRATORS = {"merson": "RungeKuttaMerson", "feldberg": "RungeKuttaFeldberg", "cpodes": "CPodes"}
 FAMILIES = {
@@ -44,8 +44,8 @@ class Simbody(Engine):
     alternatives = (Alternatives({name: Setting(name, {"accuracy": 1e-9}) for name in INTEGRATORS}, 1e-5),)
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Refuse armatures, drivers that add a sine to a polynomial, and scenes without masses whose motion
-        is not prescribed in full."""
+        """Refuse armatures, springs of no length at the start, drivers that add a sine to a polynomial, and
+        scenes without masses whose motion is not prescribed in full."""
         if rotor := next((j.name for j in scene.joint if j.reflected_inertia), ""):
             return Cannot(
                 Owner.ENGINE, f"joint {rotor!r} has an armature, which Simbody's joints do not have"
@@ -54,6 +54,10 @@ class Simbody(Engine):
         if mixed:
             reason = "OpenSim's sum of a polynomial and a sine has a wrong second derivative; it would drive"
             return Cannot(Owner.ENGINE, f"{reason} {', '.join(mixed)}")
+        for k, load in enumerate(scene.load):
+            if isinstance(load, Spring) and load.points[0] == load.points[1]:
+                reason = f"the ends of load[{k}] meet, where Simbody's force between points is not finite"
+                return Cannot(Owner.ENGINE, reason)
         return lacks_mass(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:

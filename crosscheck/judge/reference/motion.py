@@ -25,6 +25,10 @@ def no_progress(_: float) -> None:
     """Ignore the time that a motion has reached."""
 
 
+class Ended(ArithmeticError):
+    """The motion cannot be followed further; the message is the reason, as a clause."""
+
+
 @dataclass(frozen=True)
 class Motion:
     """Samples at the k requested times that were reached, of nb bodies, world frame, SI units.

@@ -11,11 +11,15 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.judge.arithmetic import doubles
 from crosscheck.judge.reference.held_rows import function_series
+from crosscheck.judge.reference.motion import Ended
 from crosscheck.judge.reference.natural import NaturalCoordinates, skew
 from crosscheck.judge.reference.natural_joints import AngleForm, SlideForm, convolved
 from mbref.scene import Factor, Force, JointLoad, Moment, Spring
 from mbref.scene.joints import ANGLE
+
+MEETING = 1e-12  # length of a spring / length of the mechanism, up to which its ends meet
 
 
 class Loads:
@@ -56,6 +60,12 @@ class Loads:
             self.springs.append(SpringForm(of, load))
         else:
             (self.turned if load.coordinate == ANGLE else self.slid).append(JointForm(of, load))
+
+    def refuse_abrupt(self, x: np.ndarray) -> None:
+        """Raise Ended if the ends of a spring meet at coordinates x (3, n) where its force has no series."""
+        for spring in self.springs:
+            if not spring.is_linear and np.abs(doubles(x @ spring.vector)).max() <= MEETING:
+                raise Ended(f"the ends of load[{spring.place}] meet, where its force has no direction")
 
     def series(self, t: Any, angles: Sequence[Any], terms: int) -> LoadSeries:
         """Return the loads as series about t with the given number of terms, from the angles of ``turned`` at
@@ -112,14 +122,17 @@ class LoadSeries:
 
 
 class SpringForm:
-    """A spring between two points: its vector X e, stiffness, damping, natural length."""
+    """A spring between two points: its vector X e, stiffness, damping, natural length. If it ``is_linear``,
+    its force is stiffness times the vector, also where the ends meet."""
 
     def __init__(self, of: NaturalCoordinates, load: Spring):
         ends = (of.point(b, p) for b, p in zip(of.indices(load.bodies), load.points, strict=True))
         start, stop = ends
+        self.place = of.scene.load.index(load)
         self.vector, self.zeros = stop - start, of.arithmetic.zeros
         self.stiffness, self.damping = of.arithmetic.array([load.stiffness, load.damping])
         self.rest = of.arithmetic.number(load.natural_length) / of.length
+        self.is_linear = load.damping == 0.0 and load.natural_length == 0.0
 
 
 class SpringSeries:
@@ -133,6 +146,8 @@ class SpringSeries:
     def grow(self, k: int, x: np.ndarray) -> None:
         """Compute order k of the vector, of its length and of 1 / length, and order k - 1 of the rate."""
         self._d[k] = x[k] @ self._form.vector
+        if self._form.is_linear:
+            return
         square = convolved(self._d, self._d, k).sum()
         if k == 0:
             self._length[0] = np.sqrt(square)
@@ -146,6 +161,8 @@ class SpringSeries:
     def order(self, k: int) -> np.ndarray:
         """Return order k (3, n) of the force."""
         form = self._form
+        if form.is_linear:
+            return -form.stiffness * self._d[k][:, None] * form.vector
         elastic = -form.stiffness * form.rest * self._inverse[k]
         self._pull[k] = elastic + form.damping * convolved(self._rate, self._inverse, k)
         if k == 0:

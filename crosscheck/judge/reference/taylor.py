@@ -18,7 +18,7 @@ from crosscheck.judge.arithmetic import Arithmetic, doubles, largest
 from crosscheck.judge.deadline import TimeIsUp, ask, within
 from crosscheck.judge.reference.expansion import Expansion, Series, value
 from crosscheck.judge.reference.held_rows import HeldRows, independent
-from crosscheck.judge.reference.motion import Motion, Progress, Times, no_progress
+from crosscheck.judge.reference.motion import Ended, Motion, Progress, Times, no_progress
 from crosscheck.judge.reference.natural import NaturalCoordinates
 from crosscheck.judge.reference.natural_loads import Loads
 from crosscheck.judge.reference.saddle_point import SaddlePoint
@@ -47,10 +47,6 @@ LEAST_STEP = 1e-6  # s; shortest step near the time limit
 SHORTEST = 1e-9  # step / time reached: a shorter step ends the run
 STEPS_END = "its steps end: its series cannot be continued over a singular position there"
 WITHOUT_INERTIA = 1e-13  # fraction of the largest inertia; smaller inertias count as zero
-
-
-class Ended(ArithmeticError):
-    """The motion cannot be followed further; the message is the reason, as a clause."""
 
 
 def natural_motion(
@@ -127,6 +123,7 @@ class Stepper:
         self._held = self._choice(self._x, self.t)[0]
         self._conditioning = [self._sharp(self._x, self.t)]
         self._refuse_undetermined()
+        self._loads.refuse_abrupt(self._x)
         self._start()
         pending = list(times)
         while pending:

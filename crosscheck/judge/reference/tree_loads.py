@@ -133,7 +133,11 @@ class Loads:
         pair = [self.tree.scene.body_index(name) for name in load.bodies]
         ends = [self._point(placed, body, point) for body, point in zip(pair, load.points, strict=True)]
         offset, rate = ends[1][1] - ends[0][1], ends[1][2] - ends[0][2]
-        direction = unit(offset)
+        apart = np.where(
+            dot(offset, offset)[:, None] > 0, offset, rate
+        )  # ends that meet part along their rate
+        length = np.sqrt(dot(apart, apart))[:, None]
+        direction = apart / np.where(length > 0, length, 1)
         stiffness, damping, natural = self.tree.arithmetic.array(
             (load.stiffness, load.damping, load.natural_length)
         )

@@ -16,11 +16,13 @@ from crosscheck.judge.arithmetic import DOUBLE, EXTENDED, Arithmetic, doubles
 from crosscheck.judge.deadline import ask
 from crosscheck.judge.reference.tree_equations import Instant, TreeEquations
 from crosscheck.judge.reference.vectors import apply, product, unit
+from crosscheck.judge.small_motions.meeting_ends import refuse_damped_meeting
 from crosscheck.judge.small_motions.turning import REST, Turning
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
 from mbref.scene import Scene
 
+PROBE = 1e-6  # displacement, rad or lengths, that shows the directions in which the ends of springs part
 STEP = 0.02  # increment of difference quotients, rad or lengths of the mechanism
 CENTRAL = ((1, 4 / 5), (2, -1 / 5), (3, 4 / 105), (4, -1 / 280))  # weights of differences of order 8
 CLOSED = 1e-12  # largest residual of closed loops / length of the mechanism
@@ -182,9 +184,12 @@ class Balance:
         return -1 * _difference(pushed, basis, h, 8)
 
     def small(self, y: np.ndarray, h: float = STEP) -> Small:
-        """Return the matrices of small motions about a steady state (n,)."""
+        """Return the matrices of small motions about a steady state (n,); raises SceneError where the motion
+        is not linear."""
         at = self.at(y[None])
         basis = self.basis(at)
+        aside = self.moved(y, PROBE * self.sizes.max() * basis.T)
+        refuse_damped_meeting(self.scene, self.poses(y), [self.poses(each) for each in aside])
         mass = self.equations.loads.mass_matrix(at.placed, at.coordinates)[0]
         parts = mass @ basis, self.damping(y, basis, h), self.stiffness(y, basis, h)
         first, second, third = (doubles(basis.T @ part) for part in parts)

@@ -18,7 +18,7 @@ from mbref.design.derivatives.sensitivities import (
     compared,
 )
 from mbref.design.derivatives.start_numbers import is_of_start
-from mbref.design.derivatives.states import Direction, States
+from mbref.design.derivatives.states import Direction, States, refuse_abrupt_springs
 from mbref.design.derivatives.tangents import (
     RowPartition,
     TangentRows,
@@ -63,7 +63,7 @@ def equilibrium_sensitivities(
     Raises
     ------
     SceneError
-        If the scene has no number at a path.
+        If the scene has no number at a path, or the ends of a spring meet where its force has no direction.
     InputError
         If the scene is not at rest in an equilibrium, has no masses, or is in neutral equilibrium, and for
         the reasons of ``sensitivities``.
@@ -114,6 +114,7 @@ def moved_equilibrium(request: DerivativeRequest, step: float) -> MovedEquilibri
     driven = np.abs(rows.placed(rows.terms.gamma[..., None])).max(initial=0.0) * request.scene.duration**2
     if driven > AT_BALANCE:  # displacement in the scene's duration
         raise InputError(f"{name}: is not in equilibrium; a driver accelerates it")
+    refuse_abrupt_springs(model, state, rows.basis[0], request.has_points)
     state = with_accelerations(state, rows)
     found, f = tangents_at(model, state, rows, request.numbers), rows.basis.shape[2]
     # a by (u, u', numbers), and a itself

@@ -20,7 +20,7 @@ from mbref.design.derivatives.sensitivities import (
     DerivativeRequest,
 )
 from mbref.design.derivatives.start_numbers import is_of_start
-from mbref.design.derivatives.states import Direction, States
+from mbref.design.derivatives.states import Direction, States, refuse_abrupt_springs
 from mbref.design.derivatives.tangents import (
     MASSLESS,
     TangentRows,
@@ -139,7 +139,7 @@ def state_derivatives(
     Raises
     ------
     SceneError
-        If the scene has no number at a path.
+        If the scene has no number at a path, or the ends of a spring meet where its force has no direction.
     InputError
         At a singular position, for a state off the constraints, without the mass of a body that moves
         freely, and for the reasons of ``sensitivities``.
@@ -179,7 +179,7 @@ def _state(request: DerivativeRequest, given: GivenState | None) -> tuple[Motion
         q, v = frames.principal_coordinates(q), frames.principal(v)
         at = States(times, q[None], v[None], angles, none, np.zeros((1, model.m)))
         _refuse_off(model, at)
-    _refuse_singular(model, at, scene.name)
+    _refuse_singular(model, at, scene.name, request.has_points)
     return motion, at
 
 
@@ -195,13 +195,15 @@ def _refuse_off(model: Model, at: States) -> None:
         raise InputError(f"state: its velocities are off the constraints by {np.abs(off).max():.2g}")
 
 
-def _refuse_singular(model: Model, at: States, name: str) -> None:
-    """Raise InputError if the rank of the constraints at a state (1,) is less than near it."""
+def _refuse_singular(model: Model, at: States, name: str, by_points: bool) -> None:
+    """Raise InputError if the rank of the constraints at a state (1,) is less than near it, and SceneError
+    where a spring acts abruptly, see ``refuse_abrupt_springs``."""
     t, rank = float(at.times[0]), tangent_ranks(model, at)[0]
     singular = f"{name}: the state at t = {t:g} s is a singular position, where derivatives do not exist"
     if t == 0.0 and consistent_start(model).follows_branch:
         raise InputError(singular)
     rows = TangentRows(model, at, partition_of(model, at))
+    refuse_abrupt_springs(model, at, rows.basis[0], by_points)
     for direction in rows.basis[0].T:
         x = MOVED_AWAY * direction / np.abs(direction).max() * model.units
         q, _ = solve_positions(model, t, displaced(at.q[0], x))

@@ -215,10 +215,15 @@ class _StencilSearch:
             self.is_done = True
 
 
+def is_of_point(path: str) -> bool:
+    """Return whether a path is of a coordinate of a point."""
+    return bool(re.search(r"anchor|point|position", re.sub(r"\[[^\]]*\]", "", path)))
+
+
 def size_of_number(value: float, path: str, base: Model) -> float:
     """Return the size of a number: its value or 1, and for points the length of the shortest spring or of the
     mechanism."""
-    if not re.search(r"anchor|point|position", re.sub(r"\[[^\]]*\]", "", path)):
+    if not is_of_point(path):
         return abs(value) or 1.0
     start = base.start()[None]
     return base.length * float(shortest_spring(base, start)[0])

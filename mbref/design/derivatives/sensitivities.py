@@ -16,13 +16,15 @@ from mbref.design.derivatives.followed import Followed
 from mbref.design.derivatives.numbers_of_scene import (
     AccurateStencils,
     SceneNumber,
+    is_of_point,
     scene_numbers,
 )
 from mbref.design.derivatives.panels import Precision, gauss
 from mbref.design.derivatives.paths_of_numbers import is_same_number, unit_of_number
 from mbref.design.derivatives.result import Sensitivities
 from mbref.design.derivatives.start_numbers import StartNumber, is_of_start, start_number
-from mbref.design.derivatives.states import States, joined
+from mbref.design.derivatives.states import States, joined, refuse_abrupt_springs
+from mbref.design.derivatives.tangents import TangentRows, partition_of
 from mbref.design.derivatives.variational import Changes, VariationalEquations
 from mbref.equations.model import Model
 from mbref.equations.offsets import assembled
@@ -83,7 +85,8 @@ def sensitivities(
     Raises
     ------
     SceneError
-        If the scene cannot be simulated, or has no number at a path.
+        If the scene cannot be simulated, has no number at a path, or starts where the ends of a spring meet
+        and its force has no direction.
     InputError
         If an output has no derivative, if the motion does not depend smoothly on a number, if a number moves
         the time of a switch or opens a loop, or if constraints have intervals or end stops.
@@ -192,6 +195,11 @@ class DerivativeRequest:
         rest = self.model, NUMBER_STEP, self.accurate
         return scene_numbers(self.scene, fields, *rest)
 
+    @property
+    def has_points(self) -> bool:
+        """Whether a number is a coordinate of a point."""
+        return any(map(is_of_point, self.labels))
+
     @cached_property
     def outputs(self) -> list[str]:
         """The columns of the motion that are differentiated."""
@@ -204,6 +212,9 @@ class DerivativeRequest:
         """Return a run by a method and its changes by the numbers; it has the panels of a run ``before``."""
         model, step = self.model, precision.step
         run = Followed.of(self.scene, model, method, limits, self.samples, gauss(precision.points), before)
+        if run.undecided_from > 0.0:
+            basis = TangentRows(model, run.first, partition_of(model, run.first)).basis[0]
+            refuse_abrupt_springs(model, run.first, basis, self.has_points)
         self.motion = self.motion or run.motion
         started = [label for label in self.labels if is_of_start(label)]
         of_start = [start_number(label, self.motion, model, run.first, step) for label in started]

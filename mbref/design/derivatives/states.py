@@ -7,10 +7,9 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from mbref import rotations
+from mbref.design.meeting_ends import MEETING, refuse_meeting_ends, spring_gaps
 from mbref.equations.coordinates import displace_all
 from mbref.equations.model import Model, Terms
-from mbref.kernels.scene_layout import SPRING
 
 # change (lengths, rad, or of a rate) that is an underflow of rounding and counts as zero; a step of
 # differences over a smaller one would overflow
@@ -84,20 +83,18 @@ class Direction(NamedTuple):
 
 
 def shortest_spring(model: Model, q: np.ndarray) -> np.ndarray:
-    """Return the length (k,) of the shortest spring at q (k, 7 nb) over the mechanism's; at most 1."""
-    loads, count = model.data.loads, len(q)
-    springs = np.flatnonzero(loads.kind == SPRING)
-    frame = np.broadcast_to([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (count, 1, 7))
-    poses = np.concatenate([q.reshape(count, model.nb, 7), frame], axis=1)
-    ends = (
-        poses[:, bodies, :3] + rotations.rotate(poses[:, bodies, 3:], points[None])
-        for bodies, points in (
-            (loads.first[springs], loads.point_first[springs]),
-            (loads.second[springs], loads.point_second[springs]),
-        )
-    )
-    lengths = np.linalg.norm(np.subtract(*ends), axis=2) / model.length
-    return np.asarray(lengths.min(axis=1, initial=1.0))
+    """Return the length (k,) of the shortest spring at q (k, 7 nb) over the mechanism's; at most 1. Springs
+    whose ends meet do not count: only forces that are linear there have derivatives."""
+    lengths = np.linalg.norm(spring_gaps(model, q), axis=2) / model.length
+    return np.asarray(np.where(lengths > MEETING, lengths, 1.0).min(axis=1, initial=1.0))
+
+
+def refuse_abrupt_springs(model: Model, at: States, basis: np.ndarray, by_points: bool) -> None:
+    """Raise SceneError if the force of a spring changes abruptly at a state (1,), along the freedoms (n, f)
+    or with the points of the scene."""
+    moving = at.v[0] / model.units
+    columns = np.column_stack([basis, moving] + [np.eye(model.n)] * (by_points and bool(moving.any())))
+    refuse_meeting_ends(model, at.q[0], columns, "derivatives do not exist")
 
 
 def terms_along(model: Model, states: States) -> Terms:
