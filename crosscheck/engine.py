@@ -9,6 +9,7 @@ import os
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
+from functools import lru_cache
 from importlib import import_module, metadata
 
 import numpy as np
@@ -98,13 +99,7 @@ class Engine(ABC):
     compile_seconds: float = 0.0
 
     def version(self) -> str:
-        """Return the version of the engine; by default the version of ``package``.
-
-        Raises
-        ------
-        ImportError
-            If its package is not installed.
-        """
+        """Return the version of the engine, of ``package`` by default; raises ImportError if missing."""
         return metadata.version(self.package)
 
     def cannot(self, scene: Scene) -> Cannot | None:
@@ -269,8 +264,14 @@ ENTRY_POINTS = "crosscheck.engines"
 
 def engine_names() -> tuple[str, ...]:
     """Return the names of crosscheck's engines and of the engines that installed packages register."""
-    registered = (point.name for point in metadata.entry_points(group=ENTRY_POINTS))
+    registered = (point.name for point in _registered(tuple(sys.path)))
     return (*BUILT_IN, *OPTIONAL, *ON_REQUEST, *registered)
+
+
+@lru_cache(maxsize=1)
+def _registered(_path: tuple[str, ...]) -> tuple[metadata.EntryPoint, ...]:
+    """Return the engines that packages in the folders of Python's path register."""
+    return tuple(metadata.entry_points(group=ENTRY_POINTS))
 
 
 def default_engines() -> tuple[str, ...]:
@@ -310,21 +311,19 @@ def engine(name: str) -> Engine:
     LookupError
         If there is no such engine; the message lists the known engines.
     """
+    found: object
     if name in BUILT_IN + OPTIONAL + ON_REQUEST:
-        return _as_engine(name, import_module(f"crosscheck.engines.{name}").ENGINE)
-    for point in metadata.entry_points(group=ENTRY_POINTS):
-        if point.name == name:
-            return _as_engine(name, point.load())
-    if ":" in name:
+        found = import_module(f"crosscheck.engines.{name}").ENGINE
+    elif registered := [point for point in _registered(tuple(sys.path)) if point.name == name]:
+        found = registered[0].load()
+    elif ":" in name:
         module, attribute = name.split(":", 1)
         if (here := os.getcwd()) not in sys.path:
             sys.path.append(here)
-        return _as_engine(name, getattr(import_module(module), attribute))
-    known = engine_names()
-    raise LookupError(f"unknown engine {name!r}; known: {', '.join(known)}{meant(name, known)}")
-
-
-def _as_engine(name: str, found: object) -> Engine:
+        found = getattr(import_module(module), attribute)
+    else:
+        known = engine_names()
+        raise LookupError(f"unknown engine {name!r}; known: {', '.join(known)}{meant(name, known)}")
     if isinstance(found, Engine):
         return found
     raise LookupError(f"{name!r} is not an engine: the object does not implement crosscheck.engine.Engine")

@@ -205,7 +205,8 @@ def read(path: str | Path, options: ImportOptions | None = None) -> Imported:
 
 def is_readable(path: str | Path) -> bool:
     """Return whether an installed format reads files of this suffix."""
-    return any(Path(path).suffix in point.load().reads for point in entry_points(group=GROUP))
+    ending = Path(path).suffix
+    return bool(ending) and any(ending in point.load().reads for point in entry_points(group=GROUP))
 
 
 def write(scene: Scene, path: str | Path) -> tuple[str, ...]:

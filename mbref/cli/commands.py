@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +60,7 @@ def _with_lines(options: argparse.Namespace, faults: Sequence[str]) -> Sequence[
     return with_lines(path.read_text(encoding="utf-8-sig", errors="replace"), faults)
 
 
+@cache
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     whole = Parser(
