@@ -171,12 +171,12 @@ class Compiling(Fake):
 
 
 class CompilingModels(Fake):
-    """Computes for 0.4 s of CPU time in each run, and says that it compiles for as long."""
+    """Computes for 0.2 s of CPU time in each run, and says that it compiles for as long."""
 
     compile_seconds = 10.0
 
     def act(self, scene: Scene) -> None:
-        computing(time.process_time() + 0.4)
+        computing(time.process_time() + 0.2)
 
 
 class Varying(Fake):

@@ -1,6 +1,7 @@
 """Sections on accelerations, reactions and support / records with known differences put in."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from reports.sections import accelerations, crossings, reactions, support
 from tests.reports.drawn import BACKGROUND, bars
 
 
+@cache
 def runs_of(name: str) -> SceneRuns:
     """One run as an engine's, and as another engine's whose reactions and accelerations are 1 % larger."""
     scene = SCENES[name]().with_(duration=0.01)

@@ -67,7 +67,7 @@ def test_a_failed_engine_gives_a_crashed_trajectory_with_the_cause(fake: str, me
 
 
 def test_the_time_that_an_engine_needs_to_compile_extends_the_limit_of_a_run():
-    """The engine computes for 0.4 s at a limit of 0.1 s. A run in a child and one in this process complete if
+    """The engine computes for 0.2 s at a limit of 0.1 s. A run in a child and one in this process complete if
     it says that it compiles for up to 10 s, and time out if not."""
     runner = InProcess(CompilingModels(), time_limit=0.1)
     for ended in (run("COMPILING_MODELS", time_limit=0.1), runner.observe(still(), TIMES, PLAIN).value):
@@ -146,7 +146,7 @@ def test_runs_in_turn_share_a_process_until_one_passes_its_limit(tmp_path: Path)
         ({}, 60.0, "COMPLETED"),
         ({"outcome": "NOT_CONVERGED"}, 60.0, "NOT_CONVERGED"),
         ({}, 60.0, "COMPLETED"),
-        ({"sleep": 60.0}, 1.0, "TIMED_OUT"),
+        ({"sleep": 60.0}, 0.3, "TIMED_OUT"),
         ({}, 60.0, "COMPLETED"),
     ]
     for options, limit, outcome in runs:

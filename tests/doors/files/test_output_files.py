@@ -64,10 +64,10 @@ def test_full_disk_leaves_no_part_of_a_file_and_a_file_that_existed_unchanged(co
 
 
 def test_full_disk_leaves_no_part_of_a_reference_table(tmp_path, capsys):
-    """The operating system lets no file have more than 500 bytes; the table of 20 rows is larger."""
+    """The operating system lets no file have more than 500 bytes; the table of 6 rows is larger."""
     out = tmp_path / "table.csv"
     with full_disk(500):
-        words = ["reference", "four_bar", "--samples", "20", "--out", str(out)]
+        words = ["reference", "four_bar", "--samples", "6", "--out", str(out)]
         assert crosscheck(words) == 2
     assert str(out) in capsys.readouterr().err and not [*tmp_path.iterdir()]
 

@@ -93,7 +93,7 @@ def test_change_of_the_energy_is_the_drivers_work_less_the_dampers_losses(seed: 
 def test_torque_that_lacks_the_armature_is_off_and_the_armature_is_named() -> None:
     """The torque is J φ'' instead of (J + I) φ''. It is constant, so that a factor J / (J + I) and an offset
     -I φ'' explain it as well: the explanation joins the three by "or"."""
-    scene, times = driven(armature=ARMATURE), np.linspace(0.0, 1.0, 21)
+    scene, times = driven(armature=ARMATURE), np.linspace(0.0, 1.0, 11)
     table = crosscheck.reference_table(scene, times)
     wrong = {"time": times, "driver(A).torque": 0 * times + INERTIA * RATE, "A.angle": table["A.angle"]}
     found = crosscheck.judge_motion(scene, wrong)

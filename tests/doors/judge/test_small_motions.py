@@ -1,6 +1,7 @@
 """The judge's equilibria, steady motions and eigenvalues / closed forms; engines about the judge's poses."""
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -30,10 +31,16 @@ from tests.helpers.statics import rod
 KNOWN = {mechanism.name: mechanism for mechanism in MECHANISMS}
 
 
+@cache
+def poses(make, starts):
+    """Return the judge's poses of a mechanism from some starts."""
+    return steady_poses(make(), starts=starts)
+
+
 @pytest.fixture(scope="module", params=list(KNOWN))
 def judged(request):
     mechanism = KNOWN[request.param]
-    return mechanism, steady_poses(mechanism.make(), starts=8)
+    return mechanism, poses(mechanism.make, 8)
 
 
 def test_judge_finds_the_eigenvalues_of_closed_forms(judged):
@@ -111,8 +118,8 @@ def test_engine_s_accelerations_give_the_judge_s_eigenvalues(name):
     """Differences of its accelerations about the judge's poses of a resting and a turning pendulum and of
     damped slides give eigenvalues within 1e-9 of the judge's, of the largest."""
     pytest.importorskip(name)
-    for scene in (pendulum(), turning_pendulum(), damped_slides()):
-        each = steady_poses(scene, starts=1)[0]
+    for make in (pendulum, turning_pendulum, damped_slides):
+        each = poses(make, 1)[0]
         found = by_accelerations(engine(name), each)
         assert found.eigenvalues is not None, found.reason
         assert error(found.eigenvalues, each.eigenvalues) < 1e-9
@@ -122,8 +129,8 @@ def test_mujoco_s_own_linearisation_has_the_judge_s_eigenvalues():
     """MuJoCo linearises a step by finite differences, whose errors are within 1e-6 for a pendulum and 1e-4
     for damped slides; relative to the largest eigenvalue."""
     pytest.importorskip("mujoco")
-    [below] = [each for each in steady_poses(pendulum(), starts=4) if each.stability == "stable"]
-    [slides] = steady_poses(damped_slides(), starts=1)
+    [below] = [each for each in poses(pendulum, 4) if each.stability == "stable"]
+    [slides] = poses(damped_slides, 1)
     mujoco = engine("mujoco")
     assert error(mujoco.own_eigenvalues(at_pose(below.balance, below.state)), below.eigenvalues) < 1e-6
     assert error(mujoco.own_eigenvalues(damped_slides()), slides.eigenvalues) < 1e-4
@@ -133,8 +140,8 @@ def test_exudyn_s_own_linearisation_leaves_out_how_constraint_forces_turn():
     """Slides, whose constraint forces do not turn, have the judge's eigenvalues; a pendulum's, which follow
     from the turning of its hinge's force alone, are zero. Both to 1e-6, by finite differences."""
     pytest.importorskip("exudyn")
-    [below] = [each for each in steady_poses(pendulum(), starts=4) if each.stability == "stable"]
-    [slides] = steady_poses(damped_slides(), starts=1)
+    [below] = [each for each in poses(pendulum, 4) if each.stability == "stable"]
+    [slides] = poses(damped_slides, 1)
     exudyn = engine("exudyn")
     assert np.abs(exudyn.own_eigenvalues(at_pose(below.balance, below.state))).max() < 1e-6
     assert error(exudyn.own_eigenvalues(damped_slides()), slides.eigenvalues) < 1e-6

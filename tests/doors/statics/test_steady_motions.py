@@ -1,6 +1,7 @@
 """Steady motions of mechanisms that turn with a driver, against closed forms."""
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -33,12 +34,18 @@ def squares(each) -> np.ndarray:
     return np.asarray(each.eigenvalues**2)
 
 
+@cache
+def steady(rate):
+    """Return the steady motions of the pendulum at a rate (rad/s) of its spindle."""
+    return equilibria(turning_pendulum(rate))
+
+
 @pytest.mark.parametrize("rate", [3.0, 4.0, 4.8, 6.0, -6.0, 12.0])
 def test_a_pendulum_on_a_spindle_leaves_the_axis_above_the_critical_rate(rate):
     """Steady angles are 0, π and, from Ω² = g / l on, acos(g / (l Ω²)) on both sides, to ACCURACY. Their
     eigenvalues are I s² = -(m g l cos α - m l² Ω² cos 2α), I = OWN + m l²; s² < 0 is stable. Eigenvalues are
     exact to rounding of sums of 1e3, 1e-11."""
-    found = equilibria(turning_pendulum(rate))
+    found = steady(rate)
     cosine = G / (LENGTH * rate**2)
     expected = [0.0, np.pi] + ([np.arccos(cosine), -np.arccos(cosine)] if cosine < 1 else [])
     assert np.allclose(sorted(angle(each) for each in found), sorted(expected), atol=ACCURACY)
@@ -52,14 +59,14 @@ def test_a_pendulum_on_a_spindle_leaves_the_axis_above_the_critical_rate(rate):
 
 def test_hinge_of_a_steady_motion_carries_weight_and_centripetal_force():
     """At Ω = 6 rad/s and the radius r: m Ω² r towards the axis, and m g, to ACCURACY."""
-    [each] = [e for e in equilibria(turning_pendulum(6.0)) if e.stability == "stable" and angle(e) > 0]
+    [each] = [e for e in steady(6.0) if e.stability == "stable" and angle(e) > 0]
     radius = each.scene.body[1].position[0]
     assert np.allclose(each.reactions["B"][:3], [-MASS * 36.0 * radius, 0.0, MASS * G], atol=ACCURACY)
 
 
 def test_scene_of_a_steady_motion_begins_with_its_velocities():
     """Both bodies turn at Ω = 6 rad/s about z; the ball at the radius r moves at Ω r, to ACCURACY."""
-    [each] = [e for e in equilibria(turning_pendulum(6.0)) if e.stability == "stable" and angle(e) > 0]
+    [each] = [e for e in steady(6.0) if e.stability == "stable" and angle(e) > 0]
     radius = each.scene.body[1].position[0]
     assert np.allclose(each.scene.body[1].velocity, [0.0, 6.0 * radius, 0.0], atol=ACCURACY)
     assert np.allclose([b.angular_velocity for b in each.scene.body], [0.0, 0.0, 6.0], atol=ACCURACY)
