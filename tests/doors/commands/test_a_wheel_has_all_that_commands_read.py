@@ -25,8 +25,8 @@ COMMANDS = {  # --help of the commands that take long
     "mbref": [
         *("new my.toml", "assemble my.toml --out closed.toml", "schema", "draw my.toml"),
         *("animate my.toml --duration 0.1", f"run four_bar_gravity {SHORT} --out motion.csv"),
-        *(f"plot four_bar_gravity energy {SHORT} --out energy.svg", "equilibrium four_bar_gravity"),
-        *("diagnose my.toml", "modes four_bar_gravity", "fit --help", "design --help"),
+        *(f"plot four_bar_gravity energy {SHORT} --out energy.svg", "equilibrium point_pendulum --starts 1"),
+        *("diagnose my.toml --start", "modes point_pendulum --starts 1", "fit --help", "design --help"),
         f"sensitivities four_bar_gravity {SHORT} --of energy --to gravity.y",
         *("ensemble four_bar_gravity --help", "import model.xml"),
         *("export four_bar_gravity --out four_bar.xml", "list", "completion bash"),
