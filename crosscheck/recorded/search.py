@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from crosscheck.judge.deadline import TimeIsUp, within
 from crosscheck.recorded.changed_scenes import changed
 from crosscheck.recorded.column_errors import Compared
 from crosscheck.recorded.explanations import CELLS, Cause, Difference, Explanation, accepted, joined, simplest
+from crosscheck.recorded.leaps import leaps
 from crosscheck.recorded.pairs_of_explanations import pairs
 from crosscheck.recorded.simple_causes import simple
 from mbref.scene import Scene
@@ -39,7 +40,7 @@ def search(
     the table. Pairs of simple causes are tried last. ``later`` are the exact columns from 0 to ``end`` (s).
     """
     found: list[tuple[Explanation, Cause]] = []
-    difference = _difference(compared, later, end)
+    difference = _difference(compared, later, end, leaps(scene, compared.times))
     if difference.is_absurd or difference.cells < CELLS:
         return Search()
     is_complete = True
@@ -65,11 +66,14 @@ def _causes(scene: Scene, difference: Difference, found: list[tuple[Explanation,
 
 
 def _difference(
-    compared: Compared, later: Mapping[str, Callable[[np.ndarray], np.ndarray]], end: float
+    compared: Compared,
+    later: Mapping[str, Callable[[np.ndarray], np.ndarray]],
+    end: float,
+    at_leaps: Collection[int],
 ) -> Difference:
-    """Return the difference at SAMPLES samples or fewer."""
-    count = len(compared.times)
-    rows = np.unique(np.linspace(0, count - 1, min(count, SAMPLES)).astype(int))
+    """Return the difference at SAMPLES samples or fewer, without those at leaps, which have two sides."""
+    smooth = np.setdiff1d(np.arange(len(compared.times)), [*at_leaps])
+    rows = smooth[np.unique(np.linspace(0, len(smooth) - 1, min(len(smooth), SAMPLES)).astype(int))]
     recorded, exact = ({n: c[rows] for n, c in of.items()} for of in (compared.recorded, compared.exact))
     return Difference(
         compared.times[rows],
