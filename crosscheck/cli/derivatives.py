@@ -90,10 +90,10 @@ def _show_cards(found: Sequence[Verdict]) -> None:
     out.print(shown)
     for card in dict.fromkeys(verdict.card for verdict in found if verdict.fails and verdict.card):
         out.print(f"{card}: {CARDS[card].about}", soft_wrap=True)
-    for verdict in found:
-        if verdict.reason:
-            where = " ".join(part for part in (verdict.engine, verdict.card, verdict.scene) if part)
-            out.print(f"{where}: {verdict.reason}", soft_wrap=True)
+    for name, reason in dict.fromkeys((each.engine, each.reason) for each in found if each.reason):
+        alike = [each for each in found if (each.engine, each.reason) == (name, reason)]
+        where = dict.fromkeys(" on ".join(filter(None, (each.card, each.scene))) for each in alike)
+        out.print(": ".join(filter(None, (name, ", ".join(where), reason))), soft_wrap=True)
 
 
 def _scenes(paths: Sequence[str]) -> list[Scene]:

@@ -30,7 +30,12 @@ from mbref.scene import Scene
 RIGHT = compare.MOST[compare.RIGHT]  # most relative error of a card of an engine in double precision
 IN_ROUNDINGS = 1e4  # and of an engine in single precision, in its roundings
 SHARE = 0.02  # of the time in which a body turns by 1 rad: step of differences along the motion
+NO_FORCES = "the engine has no derivatives by forces; cards ask for the others"
 LENGTH, TIME = 100.0, 10.0  # other units: centimetres and tenths of seconds
+
+
+class NotAsked(Exception):
+    """A card has nothing to compare; the argument is the reason."""
 
 
 class Subject:
@@ -149,13 +154,16 @@ def _reversed(scene: Scene, body: int) -> dict[str, tuple[float, ...]]:
 
 def differences(subject: Subject, scene: Scene) -> float:
     """Differences of the engine's own accelerations with the best step equal the derivatives, with closed and
-    with open loops. Engines with derivatives along allowed motions only have none."""
+    with open loops."""
     found = subject.found(scene)
     if not isinstance(found, OwnDerivatives):
-        return 0.0
+        raise NotAsked("the engine's derivatives are along allowed motions only, so that it has no others")
     source = (subject.engine.name, subject.engine.version(), subject.function, scene.name)
     rows = [*compare.own_rows(subject.differentiating, found, source, scene)]
-    return max((row.error for row in rows if row.grade != compare.UNDECIDED), default=0.0)
+    errors = [row.error for row in rows if row.grade != compare.UNDECIDED]
+    if not errors:
+        raise NotAsked("the engine's own accelerations are not smooth near the state")
+    return max(errors)
 
 
 Change = tuple[Scene, np.ndarray, np.ndarray, np.ndarray, float]  # scene, (6 nb, 6 nb) of N, a, f; time
@@ -282,6 +290,8 @@ def verdicts(engine: Engine, cards: Sequence[str] = tuple(CARDS)) -> Iterator[Ve
     allowed = max(RIGHT, IN_ROUNDINGS * engine.rounding)
     for function in engine.differentiates_by:
         subject = Subject(engine, function)
+        if subject.found(SPATIAL[0].make()).by_force is None:
+            yield Verdict(engine.name, function, "forces", "", None, allowed, NO_FORCES)
         for name in cards:
             for mechanism in CARDS[name].on:
                 scene = mechanism.make().with_(load=[])
@@ -296,5 +306,7 @@ def _verdict(
         return Verdict(*source, None, allowed, str(refused))
     try:
         return Verdict(*source, card.check(subject, scene), allowed)
+    except NotAsked as why:
+        return Verdict(*source, None, allowed, str(why))
     except ValueError as failure:  # coordinates that cannot move as the joints allow
         return Verdict(*source, np.inf, allowed, str(failure))
