@@ -26,6 +26,7 @@ LOG = logging.getLogger("mkdocs.hooks.mbref")
 OBLIQUE = View.parse("-60,22")
 MEASURED = ("planar_slider_crank", "spatial_slider_crank", "four_bar")
 MOVING = ("planar_slider_crank", "four_bar", "spatial_slider_crank", "flyball_governor", "bennett")
+WHEELS = ("rolling", "rolling_line")
 END = 0.1  # s, of the runs that are measured
 BODIES = [
     {"name": "first", "mass": 1.0, "inertia": [0.01, 0.1, 0.1], "position": [-0.5, 0.0, 0.0]},
@@ -115,8 +116,11 @@ def joint_scene(kind: str) -> Scene:
     places = {
         "anchor": (0.0, 0.0, 0.0),
         "anchors": ((0.0, 0.0, 0.0), (0.3, 0.0, 0.5)),
-        "axis": (0.0, 1.0, 0.0) if kind == "revolute" else (1.0, 0.0, 0.0),
+        "axis": (0.0, 1.0, 0.0) if kind in ("revolute", *WHEELS) else (1.0, 0.0, 0.0),
         "axes": ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+        "normal": (0.0, 0.0, 1.0),
+        "along": (1.0, 0.0, 0.0),
+        "radius": 0.3,
     }
     joint = JOINT_TYPES[kind].at("J", ("first", "second"), **places)
     return Scene(name=kind, body=BODIES, joint=[HOLD, joint])

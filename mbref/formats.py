@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 from mbref import files
 from mbref.input_error import InputError
-from mbref.scene import Scene, refuse_intervals
+from mbref.scene import Scene, refuse_intervals, refuse_rolling
 
 GROUP = "mbref.formats"
 REMEDIES = {".xacro": "; write a URDF with `xacro FILE > robot.urdf`"}  # by endings that no format reads
@@ -222,9 +222,10 @@ def write(scene: Scene, path: str | Path) -> tuple[str, ...]:
     InputError
         If no installed format has this suffix.
     SceneError
-        If a joint or a coupling has intervals.
+        If a joint or a coupling has intervals, or a wheel rolls without slip.
     """
     refuse_intervals(scene)
+    refuse_rolling(scene, "exported files")
     from mbref.equations.offsets import assembled  # imported here: reading needs no equations
 
     exported = _found(path, "writes").write(assembled(scene))

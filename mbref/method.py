@@ -22,7 +22,7 @@ from mbref.kernels.named_memory import Packed, packed
 from mbref.kernels.records import record
 from mbref.printable import exact
 from mbref.scene.fields import meant
-from mbref.scene.structure import bushings, has_massless, has_parallel_axes, orientations
+from mbref.scene.structure import has_massless, has_parallel_axes, orientations, without_series
 from mbref.stabilisation import STABILISATIONS
 from mbref.stabilisation.base import Stabilisation
 
@@ -53,7 +53,7 @@ def default_method(scene: Scene) -> str:
     massless bodies the sparse method has no matrix, and driven motions need no steps of an integrator.
     """
     bodies = len(scene.body)
-    if bushings(scene):
+    if without_series(scene):
         return SPARSE_METHOD
     if (2.0 * bodies) ** 3 <= MOST_IN_PLANE * bodies:
         return SERIES_METHOD
@@ -66,12 +66,12 @@ def default_method(scene: Scene) -> str:
 def crossing_method(scene: Scene) -> str:
     """Return ``taylor``, which crosses singular positions, for up to MOST_BODIES bodies without bushings;
     otherwise the sparse method, which ends there."""
-    return SERIES_METHOD if len(scene.body) <= MOST_BODIES and not bushings(scene) else SPARSE_METHOD
+    return SERIES_METHOD if len(scene.body) <= MOST_BODIES and not without_series(scene) else SPARSE_METHOD
 
 
 def may_be_series(scene: Scene) -> bool:
     """Return whether a run by ``taylor`` fits into memory and ends in acceptable time."""
-    return orientations(scene) <= MOST_ORIENTATIONS and not bushings(scene)
+    return orientations(scene) <= MOST_ORIENTATIONS and not without_series(scene)
 
 
 class MethodError(Exception):

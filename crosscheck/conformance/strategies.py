@@ -21,6 +21,7 @@ from crosscheck.judge.gauss_principle import goes_on
 from mbref import rotations
 from mbref.scene import (
     GROUND,
+    HOLONOMIC_JOINTS,
     JOINT_TYPES,
     Body,
     Cylindrical,
@@ -151,7 +152,7 @@ def _joints(
     anchor = ((places[pair[0]] + places[pair[1]]) / 2 + np.array(draw(vectors)) / 4).tolist()
     along = np.array(draw(directions), dtype=float)
     across = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
-    kind = JOINT_TYPES[draw(st.sampled_from(list(kinds)))]
+    kind = JOINT_TYPES[draw(st.sampled_from([each for each in kinds if each in HOLONOMIC_JOINTS]))]
     anchors = anchor, (np.array(anchor) + along / 2).tolist()
     axes = along.tolist(), across.tolist()
     return kind.at(name, pair, anchor=anchor, anchors=anchors, axis=axes[0], axes=axes)

@@ -133,12 +133,12 @@ class Mbref(Differentiating, Engine):
 
     def serves(self, scene: Scene, family: str) -> bool:
         from mbref.equations.counts import counts, undriven_freedoms
-        from mbref.method import bushings
+        from mbref.method import without_series
         from mbref.motions.pieces import first_piece
         from mbref.simulation.simulate import why_no_code
 
         method, scene = _method(family), first_piece(scene)
-        if method.is_series and bushings(scene):
+        if method.is_series and without_series(scene):
             return False
         if method.formulation.needs_independent_columns and undriven_freedoms(scene) > 0:
             return False

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.judge import time_functions
+from crosscheck.judge import time_functions, wheels
 from mbref import rotations
 from mbref.rotations import cross
-from mbref.scene import GROUND, Driver, Joint, JointFacts, Scene, refuse_intervals
+from mbref.scene import GROUND, Driver, Joint, JointFacts, RollingWheel, Scene, refuse_intervals
 
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -33,7 +33,7 @@ class JointFrames:
     bodies: tuple[int, ...]
     points: np.ndarray  # (2, 3) frame origins, in the body frames
     frames: np.ndarray  # (2, 4) frame orientations, frame to body
-    length: float  # length of a distance joint, otherwise 0
+    length: float  # length of a distance joint or radius of a wheel, otherwise 0
     driver: Driver | None
 
     @property
@@ -63,6 +63,8 @@ def joint_frames(scene: Scene) -> tuple[JointFrames, ...]:
 def _packed(scene: Scene, joint: Joint, driver: Driver | None) -> JointFrames:
     anchors = np.array(joint.anchor_pair)
     frames = np.array([_frame(axis) for axis in _third_axes(joint)])
+    if isinstance(joint, RollingWheel):
+        frames[0] = _frame(joint.normal, joint.without_slip[0])
     points = anchors.copy()
     for k, name in enumerate(joint.bodies):
         if name != GROUND:
@@ -81,10 +83,11 @@ def _third_axes(joint: Joint) -> Sequence[Sequence[float]]:
     return (axes[0], axes[-1])
 
 
-def _frame(axis: Sequence[float]) -> np.ndarray:
-    """Return the quaternion of a frame whose third axis is along `axis`."""
+def _frame(axis: Sequence[float], first: Sequence[float] | None = None) -> np.ndarray:
+    """Return the quaternion of a frame whose third axis is along `axis`, and whose first axis may be
+    given."""
     z = np.array(axis, dtype=float) / np.linalg.norm(axis)
-    x = cross(z, np.eye(3)[np.argmin(np.abs(z))])
+    x = cross(z, np.eye(3)[np.argmin(np.abs(z))]) if first is None else np.array(first)
     x /= np.linalg.norm(x)
     return rotations.from_matrix(np.column_stack([x, cross(z, x), z]))
 
@@ -92,8 +95,8 @@ def _frame(axis: Sequence[float]) -> np.ndarray:
 def are_lengths(joint: JointFrames) -> np.ndarray:
     """Return the mask (rows,) of a joint's residuals: True for lengths (m), False for angles (rad)."""
     facts = joint.facts
-    if joint.keeps_distance:
-        return np.array([True])
+    if joint.keeps_distance or joint.facts.velocity_rows:
+        return np.ones(facts.rows, dtype=bool)
     angles = len(facts.forbidden_rotations) + joint.keeps_axes_perpendicular
     driver = [joint.slides] if joint.driver else []
     return np.array([True] * len(facts.forbidden_translations) + [False] * angles + driver)
@@ -108,6 +111,10 @@ def position_rows(
         return np.linalg.norm(offset, axis=-1, keepdims=True) - joint.length
     relative = rotations.multiply(rotations.conjugate(frames[0]), frames[1])
     local = resolve(frames[0], offset)
+    if joint.facts.velocity_rows:  # the rows of slip have no residual of positions
+        found = np.zeros((*local.shape[:-1], joint.facts.rows))
+        found[..., 0] = wheels.height(_axis(frames), local, joint.length)
+        return found
     rows = [local[..., list(joint.facts.forbidden_translations)]]
     if joint.keeps_axes_perpendicular:
         rows.append(np.arcsin(np.clip(rotations.to_matrix(relative)[..., 2, 2:], -1, 1)))
@@ -133,6 +140,9 @@ def velocity_rows(
     dv, w = anchor_velocity(joint, arms, velocity, angular_velocity)
     if joint.keeps_distance:
         return _dot(offset, dv) / np.linalg.norm(offset, axis=-1, keepdims=True)
+    if joint.facts.velocity_rows:
+        seen = relative_twist(frames, offset, dv, w)
+        return wheels.slip(_axis(frames), joint.length, *seen)[..., : joint.facts.rows]
     crossing = [_dot(w[1] - w[0], _crossing(frames)[0])] if joint.keeps_axes_perpendicular else []
     return _rows(joint, *relative_twist(frames, offset, dv, w), crossing, t, 1)
 
@@ -162,6 +172,10 @@ def acceleration_rows(
         length = np.linalg.norm(offset, axis=-1, keepdims=True)
         along = _dot(offset, dv) / length
         return (_dot(offset, da) + _dot(dv, dv) - along**2) / length
+    if joint.facts.velocity_rows:
+        seen = relative_twist(frames, offset, dv, w)
+        rate = relative_acceleration(frames, offset, (dv, da), w, dw)
+        return wheels.slip_rate(_axis(frames), joint.length, seen, rate)[..., : joint.facts.rows]
     crossing = [_crossing_acceleration(frames, w, dw)] if joint.keeps_axes_perpendicular else []
     return _rows(joint, *relative_acceleration(frames, offset, (dv, da), w, dw), crossing, t, 2)
 
@@ -178,6 +192,11 @@ def relative_acceleration(
     dv, da = parting
     seen = da - cross(dw[0], offset) - 2 * cross(w[0], dv) + cross(w[0], cross(w[0], offset))
     return resolve(frames[0], seen), resolve(frames[0], dw[1] - dw[0] - cross(w[0], w[1]))
+
+
+def _axis(frames: list[np.ndarray]) -> np.ndarray:
+    """Return the third axis (…, 3) of the second frame, seen from the first frame."""
+    return resolve(frames[0], rotations.rotate(frames[1], Z))
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:

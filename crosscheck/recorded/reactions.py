@@ -27,7 +27,7 @@ def reactions(scene: Scene, motion: Trajectory, wanted: Collection[str]) -> dict
     Components that redundant constraints leave open at a sample are left out.
     """
     names = [name for name in reaction_names(scene) if name in wanted]
-    if not names or motion.acceleration is None:
+    if not names or motion.acceleration is None or not motion.times.size:
         return {}
     found = with_exact_reactions(scene, motion).reactions or {}
     poses = zip(motion.times.tolist(), motion.position, motion.orientation, strict=True)

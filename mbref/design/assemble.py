@@ -17,7 +17,7 @@ from mbref.equations.packing import Packs
 from mbref.equations.parts import FRAME
 from mbref.equations.placed import placed
 from mbref.rotations import Vector3
-from mbref.scene import GROUND, Scene, SceneError
+from mbref.scene import GROUND, Scene, SceneError, refuse_rolling
 
 SHARES = 20  # parts into which a large change is divided, so that the loops stay on their branch
 MOST_LINK_STEPS = 50  # largest number of Gauss–Newton steps for the points of a link
@@ -67,6 +67,7 @@ def assemble(scene: Scene, lengths: Mapping[tuple[str, str], float]) -> Assemble
     lengths.
     """
     scene = assembled(scene)
+    refuse_rolling(scene, "assemblies with given lengths")
     pairs = {pair: _common_link(scene, *pair) for pair in lengths}
     shifts = _point_displacements(scene, lengths, pairs)
     q = Model(scene).start()

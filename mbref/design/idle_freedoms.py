@@ -89,6 +89,8 @@ def _sentence(model: Model, q: np.ndarray, link: list[str], joints: list[str]) -
         return ""
     if twists.shape[1] > 1:
         return f"{names} can move alone in {twists.shape[1]} ways between its joints and {verb} nothing else"
+    if any(model.scene.joint_named(joint).facts.velocity_rows for joint in joints):
+        return f"{names} can roll and {verb} nothing else"
     velocity, spin = np.split(twists[:, 0], 2)
     rate = float(np.linalg.norm(spin))
     if rate < AXIAL:

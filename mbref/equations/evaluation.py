@@ -41,6 +41,19 @@ def set_velocities(v, frames):
             angular_velocity[b, k] = v[6 * b + 3 + k]
 
 
+@kernel
+def rate_of_row(row, v, equations):
+    """Return Φ' = Φ_q v - ν of one row."""
+    bodies, blocks = equations.scene.row_bodies, equations.system.blocks
+    value = -equations.rows.nu[row]
+    for side in range(bodies.shape[1]):
+        start = 6 * bodies[row, side]
+        if start < v.shape[0]:
+            for k in range(6):
+                value += blocks[row, 6 * side + k] * v[start + k]
+    return value
+
+
 @inlined
 def violation_rate(v, equations):
     """Compute Φ' = Φ_q v - ν of every row."""

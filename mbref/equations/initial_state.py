@@ -229,7 +229,8 @@ def _solved(scenes: Alike, q: np.ndarray, most: float) -> Solved:
         return Solved(q, first, first, opened)
     for _ in range(MOST_ITERATIONS):
         places = places[open_]
-        x = _least_changes(scenes, places, terms.blocks[open_], -terms.phi[open_])
+        blocks = scenes.model.structure.of_positions(terms.blocks[open_])
+        x = _least_changes(scenes, places, blocks, -terms.phi[open_])
         moves = np.abs(x / scenes.units[places]).max(axis=1) >= SHORTEST_MOVE
         places, moved = places[moves], q[places[moves]]
         displace_all(moved, x[moves], np.zeros(q.shape[1]))

@@ -7,15 +7,27 @@ from functools import lru_cache
 from math import dist, sqrt
 from typing import NamedTuple
 
-from mbref.kernels.scene_layout import COUPLED_ANGLE, COUPLED_SLIDE, DISTANCE, DOT1, DOT2, POINT
+from mbref.kernels.scene_layout import (
+    CONTACT,
+    COUPLED_ANGLE,
+    COUPLED_SLIDE,
+    DISTANCE,
+    DOT1,
+    DOT2,
+    NO_SLIP,
+    POINT,
+)
 from mbref.rotations import Vector3
 from mbref.scene import JOINT_TYPES, Joint, SceneError
 from mbref.scene.joints import ANGLE, Coordinate, X, Y, Z
+from mbref.scene.rolling import RollingWheel
 
 MOST_JOINTS = 4096  # number of joints whose primitives are kept
 ORIGIN = (0.0, 0.0, 0.0)
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-ROWS_OF = {POINT: 3, DOT1: 1, DOT2: 1, DISTANCE: 1, COUPLED_ANGLE: 1, COUPLED_SLIDE: 1}
+ROWS_OF = {POINT: 3} | dict.fromkeys(
+    (DOT1, DOT2, DISTANCE, COUPLED_ANGLE, COUPLED_SLIDE, CONTACT, NO_SLIP), 1
+)
 # directions of the first and of the second body that stay perpendicular: the first two pairs keep the axes
 # parallel, the third prevents rotation about them
 AROUND_AXIS = ((X, Z), (Y, Z), (X, Y))
@@ -31,8 +43,9 @@ class Primitive(NamedTuple):
     point_second: Vector3 = ORIGIN
     first: Vector3 = ORIGIN
     second: Vector3 = ORIGIN
-    turning: Vector3 = ORIGIN  # for drivers: direction in the first body, perpendicular to `first`
-    length: float = 0.0  # length of a distance constraint, or the factor of a joint coordinate
+    # of drivers a direction in the first body, perpendicular to `first`; of wheels the normal of their plane
+    turning: Vector3 = ORIGIN
+    length: float = 0.0  # length of a distance constraint, radius of a wheel, or factor of a joint coordinate
     higher: tuple[float, ...] = ()  # factors of the square of a joint coordinate, and of higher powers
     driven: bool = False
 
@@ -46,11 +59,20 @@ def primitives_of(joint: Joint) -> list[Primitive]:
         return [Primitive(DISTANCE, point_first=first, point_second=second, length=dist(first, second))]
     if facts.condition == "perpendicular axes":
         return [coincident(first), perpendicular(*map(unit, joint.directions))]
+    if isinstance(joint, RollingWheel):
+        return wheel_rows(joint)
     axes, pairs = (frame(joint.directions[0]), AROUND_AXIS) if joint.directions else (AXES, WITHOUT_AXIS)
     parallel = [perpendicular(axes[j], axes[k]) for j, k in pairs[: len(facts.forbidden_rotations)]]
     if len(facts.forbidden_translations) == len(axes):
         return [coincident(first), *parallel]
     return [*parallel, *(in_plane(first, axes[k]) for k in facts.forbidden_translations)]
+
+
+def wheel_rows(joint: RollingWheel) -> list[Primitive]:
+    """Return the contact of a wheel with its plane, and the directions in which it does not slip."""
+    (first, second), (normal, axis) = joint.anchor_pair, map(unit, joint.directions)
+    rows = [(CONTACT, normal), *((NO_SLIP, along) for along in joint.without_slip)]
+    return [Primitive(kind, first, second, along, axis, normal, joint.radius) for kind, along in rows]
 
 
 def driver_primitive(joint: Joint) -> Primitive:

@@ -18,10 +18,25 @@ from mbref.equations.joints import ROWS_OF
 from mbref.equations.model import Model
 from mbref.equations.structure import LAST_PART
 from mbref.equations.units import row_lengths
-from mbref.kernels.scene_layout import COUPLED_ANGLE, COUPLED_SLIDE, DISTANCE, DOT1, DOT2, POINT
+from mbref.kernels.scene_layout import (
+    CONTACT,
+    COUPLED_ANGLE,
+    COUPLED_SLIDE,
+    DISTANCE,
+    DOT1,
+    DOT2,
+    NO_SLIP,
+    POINT,
+)
 
-ROW_WORDS = {POINT: "point", DOT1: "perpendicular", DOT2: "in plane", DISTANCE: "distance"}
-ROW_UNITS = {POINT: "m", DOT1: "rad", DOT2: "m", DISTANCE: "m", COUPLED_ANGLE: "rad", COUPLED_SLIDE: "m"}
+ROW_WORDS = {
+    POINT: "point", DOT1: "perpendicular", DOT2: "in plane", DISTANCE: "distance", CONTACT: "contact",
+    NO_SLIP: "no slip",
+}  # fmt: skip
+ROW_UNITS = {
+    POINT: "m", DOT1: "rad", DOT2: "m", DISTANCE: "m", COUPLED_ANGLE: "rad", COUPLED_SLIDE: "m", CONTACT: "m",
+    NO_SLIP: "m",
+}  # fmt: skip
 COLUMN_WORDS = ("x", "y", "z", "about x'", "about y'", "about z'")
 RANK_OF_MATRICES = 1e-10  # singular value of unit rows / largest one, below which a row counts as dependent
 
@@ -43,7 +58,7 @@ class Matrices:
     M : ndarray, shape (n, n), or None
         Mass matrix: kg, and kg m² in body axes. None if a body has no mass.
     Phi : ndarray, shape (m,)
-        Constraints Φ(q, t), in the ``row_units``.
+        Constraints Φ(q, t), in the ``row_units``; zero in rows between velocities alone (no slip).
     Phi_q : ndarray, shape (m, n)
         Constraint Jacobian: row units per m and per rad.
     nu : ndarray, shape (m,)

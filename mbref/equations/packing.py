@@ -100,6 +100,7 @@ class Packs:
             primitives=primitives,
             turning=turning,
             row_bodies=self._all(self.structure.row_bodies),
+            velocity_rows=self._all(self.structure.velocity_rows),
             functions=self._functions(),
             loads=loads,
         )

@@ -13,13 +13,15 @@ from mbref.equations.joint_angles import angles_by_joint, angles_of_pose
 from mbref.equations.model import Model
 from mbref.scene import Joint, Load, Scene, SlideSpring, TorsionSpring
 from mbref.scene.joints import DISPLACEMENT, Coordinate
+from mbref.scene.rolling import RollingLine, RollingWheel
 
 
 def placed(model: Model, q: np.ndarray) -> Scene:
     """Return the model's scene with its bodies at coordinates q (7 nb,); joints and points of loads move with
     the bodies.
 
-    A joint's anchor is read from the second body, its axis from the first body.
+    A joint's anchor is read from the second body, its axis from the first body; of a wheel, its axis from the
+    second body.
     """
     scene, zeros = model.scene, np.zeros((1, model.nb, 6))
     motion = model.motion(q.reshape(1, model.nb, 7), zeros, zeros)
@@ -83,6 +85,10 @@ def _moved_geometry(model: Model, joint: Joint, q: np.ndarray) -> dict[str, Any]
     carried = zip(joint.bodies, joint.directions * 2, strict=False)
     axes = tuple(_rounded(_direction(model, *each, q)) for each in carried)
     found: dict[str, Any] = {"axis": axes[:1] and axes[0], "axes": axes}
+    if isinstance(joint, RollingWheel):
+        found |= {"normal": axes[0], "axis": axes[1]}
+    if isinstance(joint, RollingLine):
+        found["along"] = _rounded(_direction(model, joint.bodies[0], joint.along, q))
     if "anchors" in type(joint).model_fields:
         found["anchors"] = tuple(place(model, *end, q) for end in ends)
     else:

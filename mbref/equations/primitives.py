@@ -18,6 +18,8 @@ joint coordinates q:
 
 Its rate is f'(q) q', and its γ contains -f''(q) q'².
 
+Rows of rolling wheels are in ``equations.wheels``.
+
 Jacobian columns multiply (δr, δπ') with δπ' the rotation in body axes; ν = -∂Φ/∂t and
 γ is what Φ_q q̈ must equal (Eqs. 2 and 3 of the paper).
 """
@@ -27,8 +29,9 @@ from __future__ import annotations
 from numpy import arctan2, cos, floor, pi, sin
 
 from mbref.equations.functions import function_value
+from mbref.equations.wheels import wheel
 from mbref.kernels.compilation import inlined, kernel
-from mbref.kernels.scene_layout import COUPLED_ANGLE, DISTANCE, DOT1, DOT2, POINT
+from mbref.kernels.scene_layout import CONTACT, COUPLED_ANGLE, DISTANCE, DOT1, DOT2, POINT
 from mbref.linear_algebra.vectors import (
     accumulate,
     add,
@@ -295,5 +298,7 @@ def constraints(t, equations):
             dot2(p, t, equations)
         elif kinds[p] == DISTANCE:
             distance(p, equations)
+        elif kinds[p] >= CONTACT:
+            wheel(p, equations)
         else:
             joint_coordinate(p, equations)

@@ -15,7 +15,7 @@ import numpy as np
 
 from mbref.equations.joints import ROWS_OF
 from mbref.equations.machine_memory import refuse_beyond_memory
-from mbref.kernels.scene_layout import ALONG_AXIS, COUPLED_ANGLE, FORCE, SPRING
+from mbref.kernels.scene_layout import ALONG_AXIS, COUPLED_ANGLE, FORCE, NO_SLIP, SPRING
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -104,7 +104,7 @@ class Structure:
     @functools.cached_property
     def sizes(self) -> dict[str, int]:
         """Sizes of the memory of evaluations (see ``kernels.layout``)."""
-        sides, m = self.sides, len(self.row_joint)
+        sides, m, rolling = self.sides, len(self.row_joint), self.velocity_rows.size
         return {
             "nb": self.nb,
             "n": 6 * self.nb,
@@ -114,6 +114,9 @@ class Structure:
             "powers": self.places.powers,
             "dense_rows": 0,
             "sides": sides,
+            "velocity_rows": rolling,
+            "rate_rows": m + self.nb if rolling else 0,
+            "rate_columns": 7 * self.nb if rolling else 0,
             "width": 6 * sides,
         }
 
@@ -136,6 +139,24 @@ class Structure:
         return np.array([k < 2 for _ in places.primitives for k in range(5)]
                         + [k < 2 for _ in places.loads for k in range(3)]
                         + [False for _ in places.turning for k in range(3)], dtype=bool)  # fmt: skip
+
+    @functools.cached_property
+    def velocity_rows(self) -> np.ndarray:
+        """Row numbers of the rows between velocities alone: a wheel that does not slip. Their Φ is zero."""
+        return np.asarray(self.row[self.kind == NO_SLIP])
+
+    @functools.cached_property
+    def position_rows(self) -> np.ndarray:
+        """Row numbers of the rows that restrict positions."""
+        return np.setdiff1d(self.rows, self.velocity_rows)
+
+    def of_positions(self, blocks: np.ndarray) -> np.ndarray:
+        """Return the blocks (…, m, 12) of Φ_q of the rows that restrict positions; all others are zero."""
+        if not self.velocity_rows.size:
+            return blocks
+        found = blocks.copy()
+        found[..., self.velocity_rows, :] = 0.0
+        return found
 
     @functools.cached_property
     def rows(self) -> np.ndarray:

@@ -10,7 +10,8 @@ from typing import Annotated, Any, NamedTuple
 
 from mbref.kernels.named_memory import IndexTable, Indices, Matrix, Vector
 
-POINT, DOT1, DOT2, DISTANCE, COUPLED_ANGLE, COUPLED_SLIDE = range(6)  # kinds of primitive constraints
+# kinds of primitive constraints
+POINT, DOT1, DOT2, DISTANCE, COUPLED_ANGLE, COUPLED_SLIDE, CONTACT, NO_SLIP = range(8)
 MOMENT, FORCE, SPRING, ABOUT_AXIS, ALONG_AXIS = range(5)  # kinds of loads; the last two: of joints
 
 
@@ -40,9 +41,11 @@ class Primitives(NamedTuple):
     point_first: Annotated[Matrix, "p", 3]
     point_second: Annotated[Matrix, "p", 3]
     direction_first: Annotated[Matrix, "p", 3]
-    turning_first: Annotated[Matrix, "p", 3]  # direction_first rotated by 90°, if a driver rotates it
+    # direction_first rotated by 90°, if a driver rotates it; the normal of the plane on which a wheel rolls
+    turning_first: Annotated[Matrix, "p", 3]
     direction_second: Annotated[Matrix, "p", 3]
-    length: Annotated[Vector, "p"]  # length of a distance constraint (m), or the factor of a joint coordinate
+    # length of a distance constraint or radius of a wheel (m), or the factor of a joint coordinate
+    length: Annotated[Vector, "p"]
     higher: Annotated[Matrix, "p", "powers"]  # factors of higher powers of a joint coordinate
 
 
@@ -104,6 +107,7 @@ class SceneData(NamedTuple):
     primitives: Primitives
     turning: TurningJoints
     row_bodies: Annotated[IndexTable, "m", "sides"]  # bodies of each row, padded with the fixed frame
+    velocity_rows: Annotated[Indices, "velocity_rows"]  # rows between velocities alone, whose Φ is zero
     functions: Functions
     loads: Loads
 

@@ -14,6 +14,7 @@ from mbref.scene.conditions import Release, When
 from mbref.scene.couplings import Coupling
 from mbref.scene.functions import Factor, Sine, TimeFunction
 from mbref.scene.joints import (
+    HOLONOMIC_JOINTS,
     JOINT_TYPES,
     Cylindrical,
     Distance,
@@ -40,12 +41,14 @@ from mbref.scene.loads import (
     Spring,
     TorsionSpring,
 )
+from mbref.scene.rolling import Rolling, RollingLine, RollingWheel
 from mbref.scene.scene import Scene
-from mbref.scene.structure import intermittent, refuse_intervals
+from mbref.scene.structure import intermittent, refuse_intervals, refuse_rolling, rolling_wheel
 from mbref.scene.validation import GROUND, SceneError
 
 __all__ = [
     "GROUND",
+    "HOLONOMIC_JOINTS",
     "JOINT_TYPES",
     "LOAD_TYPES",
     "Body",
@@ -68,6 +71,9 @@ __all__ = [
     "Planar",
     "Release",
     "Revolute",
+    "Rolling",
+    "RollingLine",
+    "RollingWheel",
     "Scene",
     "SceneError",
     "Sine",
@@ -81,4 +87,6 @@ __all__ = [
     "When",
     "intermittent",
     "refuse_intervals",
+    "refuse_rolling",
+    "rolling_wheel",
 ]

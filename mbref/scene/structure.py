@@ -36,6 +36,21 @@ def refuse_intervals(scene: Scene) -> None:
         raise SceneError([f"{path}: {why}; remove them here"])
 
 
+def refuse_rolling(scene: Scene, what: str) -> None:
+    """Raise SceneError if a wheel rolls without slip, for a feature, such as "equilibria", that needs
+    constraints between positions."""
+    if wheel := rolling_wheel(scene):
+        why = (
+            f"a wheel that rolls without slip constrains velocities, and {what} need constraints of positions"
+        )
+        raise SceneError([f"joint[{wheel}]: {why}"])
+
+
+def rolling_wheel(scene: Scene) -> str:
+    """Return the name of the first joint whose constraints are not integrable; empty if there is none."""
+    return next((joint.name for joint in scene.joint if joint.facts.velocity_rows), "")
+
+
 def has_massless(scene: Scene) -> bool:
     """Return whether a body has mass or inertia of zero, so that M has no inverse."""
     return any(body.mass == 0.0 or not np.any(body.inertia) for body in scene.body if body.mass is not None)
@@ -77,6 +92,17 @@ def bushings(scene: Scene) -> list[int]:
         for k, load in enumerate(scene.load)
         if isinstance(load, Spring) and load.damping > 0.0 and _coincide(*load.points)
     ]
+
+
+def without_series(scene: Scene) -> str:
+    """Return the path of the first entry of which `taylor` has no series, and why; empty if there is none."""
+    if wheel := rolling_wheel(scene):
+        return f"joint[{wheel}]: the velocities of a wheel that rolls without slip have no series"
+    for k in bushings(scene):
+        return (
+            f"the ends of the damped spring load[{k}] coincide at the start, so that its force has no series"
+        )
+    return ""
 
 
 def _coincide(first: Vector3, second: Vector3) -> bool:

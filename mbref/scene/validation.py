@@ -146,7 +146,7 @@ def _meant_field(location: Sequence[str | int], tables: Mapping[str, Sequence[st
 def named_paths(data: Mapping[str, Any], faults: Mapping[str, str]) -> Iterator[str]:
     """Return ``path: message`` for every fault, with a unique name as index: body[rod].mass."""
     for path, message in faults.items():
-        match = re.match(r"(body|joint|coupling|driver)\[(\d+)\](?=\.)", path)
+        match = re.match(r"(body|joint|coupling|driver)\[(\d+)\](?=\.|$)", path)
         if match and (name := _own_name(data, match[1], int(match[2]))):
             yield f"{match[1]}[{name}]{path[match.end() :]}: {message}"
         else:

@@ -15,6 +15,7 @@ from mbref.equations.model import displaced
 from mbref.formulations import FORMULATIONS
 from mbref.kernels.layout import NOT_CONVERGED, SINGULAR
 from mbref.linear_algebra.least_norm import null_space
+from mbref.scene.structure import without_series
 from mbref.simulation.runs import passes_with, trial_of
 from mbref.stepping.loop import (
     CREEPING,
@@ -31,6 +32,7 @@ FOLLOWS, COMPLETES = "taylor crosses singular positions", "taylor completes this
 CORRECTS = "+projection corrects violations after every step"
 FINE = 1e-13  # smallest tolerance that is tried where rounding would decide the branch
 MAY_DECIDE = "a smaller rtol or another branch may let the motion go on"
+MAY_DECIDE_ALONE = "a smaller rtol may let the motion go on"
 POSE_STEP = 0.1  # m and rad; largest change of a coordinate on the way to a nearby pose
 POSE_ITERATIONS = 12  # of Newton's method, which converges from a pose within POSE_STEP of a closed one
 LEAST_GAP = 100  # gap / rounding of the largest coordinate; smaller gaps are of Newton's method
@@ -54,12 +56,14 @@ def remedy(run: Run, status: int) -> str:
     if status == UNDECIDED:
         return _of_branch(run)
     if status == VIOLATED:
-        return CORRECTS
+        return "" if run.method.stabilisation.projects else CORRECTS
     return _follows(run) if status == LEFT_MOTION else ""
 
 
 def _of_branch(run: Run) -> str:
     """Return the advice on a tolerance and on the choice of a branch; both are tried first."""
+    if without_series(run.scene):
+        return MAY_DECIDE_ALONE
     number = len(run.crossings) + 1
     changes: dict[str, dict[str, Any]] = {
         f"rtol {FINE:g}": {"rtol": FINE, "atol": None},
@@ -83,7 +87,7 @@ def _of_branch(run: Run) -> str:
 def _follows(run: Run) -> str:
     """Return the advice to use `taylor`; empty if `taylor` does not complete the motion."""
     if trial_of(run) is None:
-        return "" if run.method.is_series else FOLLOWS
+        return "" if run.method.is_series or without_series(run.scene) else FOLLOWS
     return _completes(run)
 
 

@@ -19,11 +19,12 @@ from mbref.motions.crossing import Crossing
 from mbref.motions.motion import Motion
 from mbref.motions.trajectory import Cost, Outcome
 from mbref.scene import Scene
-from mbref.scene.structure import bushings
+from mbref.scene.structure import bushings, without_series
 from mbref.simulation import VERSION
 from mbref.simulation.advice import advice_on_rounding, remedy
 from mbref.simulation.end_positions import REDUNDANT_ROWS, Met, is_at_dead_position, is_near, met_by
 from mbref.simulation.runs import trial_of
+from mbref.simulation.wheels import lying_wheel
 from mbref.stepping.leaving import begins_at_rest, fits_no_branch, leaving_acceleration
 from mbref.stepping.loop import (
     CREEPING,
@@ -153,7 +154,7 @@ def _met(run: Run, met: Met) -> str:
     """Return one sentence on the singular position at which a run ended."""
     where = LOSE_RANK.format(", ".join(map(repr, met.joints))) if met.joints else ""
     trial = trial_of(run)
-    able = trial is None or trial.completed or trial.reached > met.time
+    able = trial.completed or trial.reached > met.time if trial else not without_series(run.scene)
     return SINGULAR_POSITION.format(met.time, where, run.method.stabilisation.name, ", taylor does" * able)
 
 
@@ -235,6 +236,8 @@ def _rounded(ranks: Ranks) -> str:
 def _remedy(run: Run, status: int) -> str:
     """Return the remedy for an early end; if rows are nearly dependent at the start, a remedy for the
     scene."""
+    if lying_wheel(run):
+        return ""
     if not run.memory.equations.system.settings.nearly_dependent or run.memory.loop.clock.time > 0.0:
         return (advice_on_rounding(run) if status in OF_ROUNDING else "") or remedy(run, status)
     turned = run.model.closed_loops > 0 and not run.scene.driver
@@ -247,6 +250,8 @@ def _cause(run: Run, status: int) -> str:
     t = memory.loop.clock.time
     if status == VIOLATED:
         row = int(memory.loop.clock.violated_row)
+        if row in run.model.structure.velocity_rows:
+            return f"the wheel of joint {run.model.row_joint[row]!r} has to slip at t = {t:.6g} s"
         size = abs(memory.equations.rows.phi[row])
         return (
             f"joint {run.model.row_joint[row]!r} is violated by {size:.3g}, more than "
@@ -256,11 +261,13 @@ def _cause(run: Run, status: int) -> str:
         return f"{run.limits.most_steps} steps were taken without reaching the end, at t = {t:.6g} s"
     if status == CREEPING:
         return f"steps at t = {t:.6g} s are too short to reach the end"
-    if status == STEP_TOO_SMALL:
+    if status == STEP_TOO_SMALL and not lying_wheel(run):
         h = memory.control.smallest_step
         return f"the error estimate requires a step below {h:.3g} s at t = {t:.6g} s"
     if status == LEFT_MOTION:
         return f"{OUTCOMES[status].sentence}, as a run by another method shows, by t = {t:.6g} s"
+    if flat := lying_wheel(run):
+        return f"the wheel of joint {flat!r} lies flat on its plane, at t = {t:.6g} s"
     return f"{OUTCOMES[status].sentence} at t = {t:.6g} s ({_failed_part(run, status)})"
 
 

@@ -25,7 +25,7 @@ from mbref.kernels.layout import SINGULAR_AHEAD
 from mbref.method import MOST_BODIES, SERIES_METHOD, Method, crossing_method
 from mbref.motions.error_estimate import distances
 from mbref.scene import Scene
-from mbref.scene.structure import bushings
+from mbref.scene.structure import without_series
 from mbref.stepping.explicit import ExplicitStepper
 from mbref.stepping.limits import GENERIC, Limits
 from mbref.stepping.loop import DONE, LEFT_MOTION, UNDECIDED
@@ -151,7 +151,7 @@ def passes_with(run: Run, **changes: Any) -> bool | None:
 
 
 def _made(run: Run) -> Trial | None:
-    if run.method.is_series or len(run.scene.body) > MOST_BODIES or bushings(run.scene):
+    if run.method.is_series or len(run.scene.body) > MOST_BODIES or without_series(run.scene):
         return None
     from mbref.taylor.preparation import KERNELS_OF_SERIES  # other methods do not import the series otherwise
 

@@ -22,7 +22,7 @@ from mbref.motions.error_estimate import ErrorEstimate, distances, rounding
 from mbref.motions.motion import Motion
 from mbref.motions.pieces import first_piece
 from mbref.scene import Scene, SceneError
-from mbref.scene.structure import bushings
+from mbref.scene.structure import without_series
 from mbref.simulation.simulate import simulate
 from mbref.stepping.limits import AUTO, FINEST, GENERATED, Limits
 
@@ -136,7 +136,7 @@ def perturbed(scene: Scene) -> Scene:
 
 def _finer(scene: Scene, method: Method, limits: Limits) -> tuple[Method, Limits]:
     """Return method and limits of the more accurate second run, from which the error is estimated."""
-    if method.is_series or (len(scene.body) <= MOST_BODIES and not bushings(scene)):
+    if method.is_series or (len(scene.body) <= MOST_BODIES and not without_series(scene)):
         by = Method.parse(f"{SERIES_METHOD}[order={ORDER}]")
     elif method.integrator.adaptive and method.stabilisation.projects:
         by = method

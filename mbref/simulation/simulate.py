@@ -27,7 +27,7 @@ from mbref.motions.motion import Motion
 from mbref.motions.pieces import is_intermittent
 from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
-from mbref.scene.structure import bushings
+from mbref.scene.structure import without_series
 from mbref.scenes import find_scene
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.runs import compare_with_default, start_run
@@ -175,11 +175,8 @@ def check_method(method: Method, scene: Scene, limits: Limits) -> None:
         raise MethodError(f"branches: {method} does not cross singular positions; use taylor")
     if limits.code == GENERATED and not method.is_series:
         raise MethodError(f"code: {method} has no generated code; use taylor")
-    if method.is_series and (found := bushings(scene)):
-        raise MethodError(
-            f"{method}: the ends of the damped spring load[{found[0]}] coincide at the start, so that its "
-            f"force has no series; use {default_method(scene)}"
-        )
+    if method.is_series and (found := without_series(scene)):
+        raise MethodError(f"{method}: {found}; use {default_method(scene)}")
 
 
 def finish_run(run: Run, progress: Callable[[float], None] | None = None) -> Motion:

@@ -12,6 +12,10 @@ chosen near a singular position is replaced behind it, and a good one is kept th
 where all pivots are small.  With ``kept`` = 0.1 partitions last near turning points of a coordinate, and
 errors are 10 to 1000 times larger than with 0.6. A partition with fewer dependent coordinates ends the run:
 the run is at a singular position.
+
+Rows between velocities alone, as of a wheel that does not slip, leave fewer independent rates than
+independent coordinates.  Then the rates have a partition of their own, of all rows: y contains independent
+coordinates and independent rates, and all other rates follow from these.
 """
 
 from __future__ import annotations
@@ -25,9 +29,15 @@ from mbref.equations.evaluation import assemble_system, evaluate
 from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import ACCEPT, CHANGED, ENTER, NOT_CONVERGED, OK, RATES, SINGULAR_AHEAD
 from mbref.kernels.named_memory import Indices, Matrix, Vector, opener
-from mbref.linear_algebra.elimination import full_pivot, lu_factor, lu_solve
+from mbref.linear_algebra.elimination import full_pivot, lu_of_chosen, lu_solve
 from mbref.linear_algebra.vectors import copy
 from mbref.stabilisation.base import Stabilisation
+from mbref.stabilisation.euler_parameter_rates import (
+    jacobian_by_euler_parameters,
+    residual_of_rows,
+    second_rates,
+    velocities_of_rates,
+)
 from mbref.stabilisation.projection import STUCK
 
 MOST_DEPENDENT_STEPS = 20  # largest number of Newton steps for the dependent coordinates
@@ -44,12 +54,13 @@ class Options(NamedTuple):
 
 
 class CoordinatePartition(NamedTuple):
-    """Number of dependent coordinates; smallest pivot of Φ_u relative to its largest, at the last state, and
-    its largest value since the partition was chosen."""
+    """Numbers of dependent coordinates and rates; smallest pivot of Φ_u relative to its largest, at the last
+    state, and its largest value since the partition was chosen."""
 
     rank: int = 0
     pivot: float = 0.0
     largest_pivot: float = 0.0
+    rate_rank: int = 0
 
 
 class Scratch(NamedTuple):
@@ -63,6 +74,13 @@ class Scratch(NamedTuple):
     exchanges: Annotated[Indices, "7*nb"]  # column exchanges of the factorisation
     last_row_order: Annotated[Indices, "m + nb"]
     last_column_order: Annotated[Indices, "7*nb"]
+    # of rates, in scenes with rows between velocities alone
+    dependent_rates: Annotated[Matrix, "rate_columns", "rate_columns"]
+    rate_row_order: Annotated[Indices, "rate_rows"]
+    rate_column_order: Annotated[Indices, "rate_columns"]
+    rate_exchanges: Annotated[Indices, "rate_columns"]
+    last_rate_row_order: Annotated[Indices, "rate_rows"]
+    last_rate_column_order: Annotated[Indices, "rate_columns"]
     partition: CoordinatePartition
 
 
@@ -70,54 +88,57 @@ options_of, scratch_of = opener(Options), opener(Scratch)
 
 
 @kernel
-def jacobian_by_euler_parameters(q, equations, a):
-    """Compute [Φ_r Φ_p; 0 2pᵀ] (m + nb, 7 nb) at the state of the last evaluation; Φ_p = 2 Φ_π' L."""
-    bodies, blocks = equations.scene.row_bodies, equations.system.blocks
-    m, nb = bodies.shape[0], q.shape[0] // 7
-    a[:] = 0.0
-    for row in range(m):
-        for side in range(bodies.shape[1]):
-            b = bodies[row, side]
-            if b < nb:
-                i, j = 7 * b, 6 * side
-                for k in range(3):
-                    a[row, i + k] = blocks[row, j + k]
-                r1, r2, r3 = 2 * blocks[row, j + 3], 2 * blocks[row, j + 4], 2 * blocks[row, j + 5]
-                w, x, y, z = q[i + 3], q[i + 4], q[i + 5], q[i + 6]
-                a[row, i + 3] = -x * r1 - y * r2 - z * r3
-                a[row, i + 4] = w * r1 - z * r2 + y * r3
-                a[row, i + 5] = z * r1 + w * r2 - x * r3
-                a[row, i + 6] = -y * r1 + x * r2 + w * r3
-    for b in range(nb):
-        for k in range(3, 7):
-            a[m + b, 7 * b + k] = 2.0 * q[7 * b + k]
-
-
-@kernel
 def choose_coordinates(memory):
     """Choose the partition at ``memory.state``, the state of the last evaluation."""
     q, scratch, system = memory.state.coordinates, scratch_of(memory.chart), memory.equations.system
-    a = scratch.jacobian
+    a, velocity_rows = scratch.jacobian, memory.equations.scene.velocity_rows
     jacobian_by_euler_parameters(q, memory.equations, a)
+    for row in velocity_rows:
+        a[row] = 0.0
     system.counts.factorisations += 1
     rank = full_pivot(
         a, a.shape[0], a.shape[1], scratch.row_order, scratch.column_order, system.settings.rank_tolerance
     )
-    scratch.partition.rank = rank
-    memory.loop.clock.y_size = 2 * (q.shape[0] - rank)
+    scratch.partition.rank = scratch.partition.rate_rank = rank
+    if velocity_rows.shape[0] > 0:
+        choose_rates(memory)
+    memory.loop.clock.y_size = 2 * q.shape[0] - rank - scratch.partition.rate_rank
     scratch.partition.largest_pivot = 0.0
 
 
 @kernel
+def choose_rates(memory):
+    """Choose the partition of the rates by all rows, at the state of the last evaluation."""
+    scratch, settings = scratch_of(memory.chart), memory.equations.system.settings
+    a, rows, columns = scratch.jacobian, scratch.rate_row_order, scratch.rate_column_order
+    jacobian_by_euler_parameters(memory.state.coordinates, memory.equations, a)
+    memory.equations.system.counts.factorisations += 1
+    scratch.partition.rate_rank = full_pivot(
+        a, a.shape[0], a.shape[1], rows, columns, settings.rank_tolerance
+    )
+
+
+@kernel
+def order_of_rates(memory):
+    """Return the order of the rates, the dependent ones first, and the number of dependent rates."""
+    scratch = scratch_of(memory.chart)
+    if memory.equations.scene.velocity_rows.shape[0] > 0:
+        return scratch.rate_column_order, scratch.partition.rate_rank
+    return scratch.column_order, scratch.partition.rank
+
+
+@kernel
 def gather_independent(y, memory):
-    """Copy the independent coordinates and their rates of ``memory.state`` into y; return the length of y."""
+    """Copy the independent coordinates and rates of ``memory.state`` into y; return the length of y."""
     state, scratch = memory.state, scratch_of(memory.chart)
     order, rank = scratch.column_order, scratch.partition.rank
-    k = order.shape[0] - rank
+    of_rates, rate_rank = order_of_rates(memory)
+    k, free = order.shape[0] - rank, of_rates.shape[0] - rate_rank
     for i in range(k):
         y[i] = state.coordinates[order[rank + i]]
-        y[k + i] = state.coordinate_rates[order[rank + i]]
-    return 2 * k
+    for i in range(free):
+        y[k + i] = state.coordinate_rates[of_rates[rate_rank + i]]
+    return k + free
 
 
 @exchangeable(ENTER)
@@ -134,39 +155,29 @@ def enter(t, y, memory):
 @kernel
 def factorise_dependent(memory):
     """Compute LU factors of Φ_u at the state of the last evaluation; return False if Φ_u is singular."""
-    scratch = scratch_of(memory.chart)
-    a, lu, rank = scratch.jacobian, scratch.dependent, scratch.partition.rank
-    rows, columns = scratch.row_order, scratch.column_order
-    jacobian_by_euler_parameters(memory.state.coordinates, memory.equations, a)
-    for i in range(rank):
-        for j in range(rank):
-            lu[i, j] = a[rows[i], columns[j]]
+    scratch, partition = scratch_of(memory.chart), scratch_of(memory.chart).partition
+    jacobian_by_euler_parameters(memory.state.coordinates, memory.equations, scratch.jacobian)
     memory.equations.system.counts.factorisations += 1
-    if not lu_factor(lu, rank, scratch.exchanges, SINGULAR_DEPENDENT):
-        return False
-    smallest, greatest = abs(lu[0, 0]), abs(lu[0, 0])
-    for i in range(rank):
-        smallest, greatest = min(smallest, abs(lu[i, i])), max(greatest, abs(lu[i, i]))
-    scratch.partition.pivot = smallest / greatest
-    return True
+    chosen = scratch.row_order, scratch.column_order, partition.rank
+    pivot = lu_of_chosen(scratch.jacobian, chosen, scratch.dependent, scratch.exchanges, SINGULAR_DEPENDENT)
+    partition.pivot = pivot if pivot > 0.0 else partition.pivot
+    return pivot > 0.0
 
 
 @kernel
-def find_violation(memory):
-    """Compute Φ and pᵀp - 1 of the active rows into the residual; return the largest."""
-    q, phi, scratch = memory.state.coordinates, memory.equations.rows.phi, scratch_of(memory.chart)
-    m, rank, size, b = phi.shape[0], scratch.partition.rank, 0.0, scratch.residual
-    for i in range(rank):
-        row = scratch.row_order[i]
-        if row < m:
-            b[i] = phi[row]
-        else:
-            j = 7 * (row - m) + 3
-            w, x, y, z = q[j], q[j + 1], q[j + 2], q[j + 3]
-            b[i] = w * w + x * x + y * y + z * z - 1.0
-        if not abs(b[i]) <= size:
-            size = abs(b[i])
-    return size
+def factorise_rates(memory):
+    """Compute LU factors of the dependent rates at the state of the last evaluation, if they have a partition
+    of their own; return False if they are singular. The smaller relative pivot of both partitions counts."""
+    if memory.equations.scene.velocity_rows.shape[0] == 0:
+        return True
+    scratch, partition = scratch_of(memory.chart), scratch_of(memory.chart).partition
+    jacobian_by_euler_parameters(memory.state.coordinates, memory.equations, scratch.jacobian)
+    memory.equations.system.counts.factorisations += 1
+    lu, exchanges = scratch.dependent_rates, scratch.rate_exchanges
+    chosen = scratch.rate_row_order, scratch.rate_column_order, partition.rate_rank
+    pivot = lu_of_chosen(scratch.jacobian, chosen, lu, exchanges, SINGULAR_DEPENDENT)
+    partition.pivot = min(partition.pivot, pivot)
+    return pivot > 0.0
 
 
 @kernel
@@ -196,7 +207,9 @@ def solve_dependent_coordinates(t, y, memory):
         state.coordinates[order[rank + i]] = y[i]
     for _ in range(MOST_DEPENDENT_STEPS):
         evaluate(t, state.coordinates, state.velocities, memory.equations)
-        violation = find_violation(memory)
+        violation = residual_of_rows(
+            state.coordinates, memory.equations.rows.phi, scratch.row_order[:rank], b
+        )
         if not factorise_dependent(memory):
             return NOT_CONVERGED
         if violation <= tolerance or before <= violation <= STUCK * tolerance:
@@ -212,48 +225,24 @@ def solve_dependent_coordinates(t, y, memory):
 @kernel
 def solve_dependent_rates(y, memory):
     """Compute the dependent rates of y (Eq. 14) and v of all bodies into ``memory.state``, with the last
-    factor of Φ_u."""
+    factor of the dependent columns."""
     scratch, nu, q_rate = scratch_of(memory.chart), memory.equations.rows.nu, memory.state.coordinate_rates
-    order, rank, a, b = scratch.column_order, scratch.partition.rank, scratch.jacobian, scratch.residual
-    free = order.shape[0] - rank
+    (order, rank), a, b = order_of_rates(memory), scratch.jacobian, scratch.residual
+    rows, lu, exchanges = scratch.row_order, scratch.dependent, scratch.exchanges
+    if memory.equations.scene.velocity_rows.shape[0] > 0:
+        rows, lu, exchanges = scratch.rate_row_order, scratch.dependent_rates, scratch.rate_exchanges
+    free, first = order.shape[0] - rank, q_rate.shape[0] - scratch.partition.rank
     for i in range(rank):
-        row = scratch.row_order[i]
+        row = rows[i]
         b[i] = nu[row] if row < nu.shape[0] else 0.0
         for k in range(free):
-            b[i] -= a[row, order[rank + k]] * y[free + k]
-    lu_solve(scratch.dependent, rank, scratch.exchanges, b)
+            b[i] -= a[row, order[rank + k]] * y[first + k]
+    lu_solve(lu, rank, exchanges, b)
     for i in range(rank):
         q_rate[order[i]] = b[i]
     for k in range(free):
-        q_rate[order[rank + k]] = y[free + k]
+        q_rate[order[rank + k]] = y[first + k]
     velocities_of_rates(memory.state)
-
-
-@kernel
-def velocities_of_rates(state):
-    """Compute v from q': r' and ω' = 2 L p'."""
-    q, q_rate, v = state.coordinates, state.coordinate_rates, state.velocities
-    for body in range(q.shape[0] // 7):
-        i, j = 7 * body, 6 * body
-        for k in range(3):
-            v[j + k] = q_rate[i + k]
-        w, x, y, z = q[i + 3], q[i + 4], q[i + 5], q[i + 6]
-        dw, dx, dy, dz = q_rate[i + 3], q_rate[i + 4], q_rate[i + 5], q_rate[i + 6]
-        v[j + 3] = 2.0 * (-x * dw + w * dx + z * dy - y * dz)
-        v[j + 4] = 2.0 * (-y * dw - z * dx + w * dy + x * dz)
-        v[j + 5] = 2.0 * (-z * dw + y * dx - x * dy + w * dz)
-
-
-@kernel
-def second_rates(acceleration, state):
-    """Compute q'' from the accelerations: r'' and p'' = ½ Lᵀ ω̇' - ¼ (ω'·ω') p."""
-    q, v, second = state.coordinates, state.velocities, state.coordinate_second
-    coordinate_rates(q, acceleration, second)
-    for body in range(q.shape[0] // 7):
-        j = 6 * body
-        square = 0.25 * (v[j + 3] * v[j + 3] + v[j + 4] * v[j + 4] + v[j + 5] * v[j + 5])
-        for k in range(3, 7):
-            second[7 * body + k] -= square * q[7 * body + k]
 
 
 @exchangeable(RATES)
@@ -261,16 +250,20 @@ def rates(t, y, y_rate, memory):
     status = solve_dependent_coordinates(t, y, memory)
     if status != OK:
         return status
+    if not factorise_rates(memory):
+        return NOT_CONVERGED
     solve_dependent_rates(y, memory)
     state, equations, scratch = memory.state, memory.equations, scratch_of(memory.chart)
     assemble_system(t, state.coordinates, state.velocities, equations)
     status = memory.kernels.accelerate(equations.system)
     second_rates(equations.system.acceleration, state)
     order, rank = scratch.column_order, scratch.partition.rank
-    free = order.shape[0] - rank
-    for i in range(free):
-        y_rate[i] = y[free + i]
-        y_rate[free + i] = state.coordinate_second[order[rank + i]]
+    of_rates, rate_rank = order_of_rates(memory)
+    k = order.shape[0] - rank
+    for i in range(k):
+        y_rate[i] = state.coordinate_rates[order[rank + i]]
+    for i in range(of_rates.shape[0] - rate_rank):
+        y_rate[k + i] = state.coordinate_second[of_rates[rate_rank + i]]
     return status
 
 
@@ -279,15 +272,17 @@ def accept(t, y, memory):
     status = solve_dependent_coordinates(t, y, memory)
     if status != OK:
         return status
+    if not factorise_rates(memory):
+        return NOT_CONVERGED
     solve_dependent_rates(y, memory)
     copy_state(memory.state, memory.previous)
     memory.watch.accepted_time = t
     partition = scratch_of(memory.chart).partition
     partition.largest_pivot = max(partition.largest_pivot, partition.pivot)
     if partition.pivot < options_of(memory.chart_options).kept * partition.largest_pivot:
-        rank = partition.rank
+        rank, rate_rank = partition.rank, partition.rate_rank
         replaced = replace_partition(memory)
-        if partition.rank < rank:
+        if partition.rank < rank or partition.rate_rank < rate_rank:
             return SINGULAR_AHEAD
         if replaced:
             gather_independent(y, memory)
@@ -300,17 +295,22 @@ def replace_partition(memory):
     """Choose the partition at ``memory.state``; return False and keep the last one if that is better."""
     scratch = scratch_of(memory.chart)
     partition, pivot = scratch.partition, scratch.partition.pivot
-    rank = partition.rank
+    rank, rate_rank = partition.rank, partition.rate_rank
     copy(scratch.row_order, scratch.last_row_order)
     copy(scratch.column_order, scratch.last_column_order)
+    copy(scratch.rate_row_order, scratch.last_rate_row_order)
+    copy(scratch.rate_column_order, scratch.last_rate_column_order)
     choose_coordinates(memory)
-    if partition.rank != rank:
+    if partition.rank != rank or partition.rate_rank != rate_rank:
         return True
     factorise_dependent(memory)
+    factorise_rates(memory)
     if pivot < BETTER * partition.pivot:
         return True
     copy(scratch.last_row_order, scratch.row_order)
     copy(scratch.last_column_order, scratch.column_order)
+    copy(scratch.last_rate_row_order, scratch.rate_row_order)
+    copy(scratch.last_rate_column_order, scratch.rate_column_order)
     partition.pivot = partition.largest_pivot = pivot
     return False
 

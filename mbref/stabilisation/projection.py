@@ -2,10 +2,12 @@
 
 The projection is mass-orthogonal: the correction is the least in the metric of M (Bayo & Ledesma, Nonlinear
 Dynamics 9, 1996). Positions are corrected by Newton's method, velocities with the factor of the last Newton
-step.  Only active coordinates are integrated (``equations.active_coordinates``).  Near a singular position
-the pivots are sorted by size, largest first. With r independent rows, the r-th pivot falls with the distance
-from the singular position; ``stepping.watch`` monitors this pivot.  A redundant row has a pivot
-of α^(-1/2); where two rows exchange their roles, the larger of their pivots is still about α^(-1/4).
+step.  Rows between velocities alone, as of a wheel that does not slip, are left out where positions are
+corrected; a further factor then includes them.  Only active coordinates are integrated
+(``equations.active_coordinates``).  Near a singular position the pivots are sorted by size, largest first.
+With r independent rows, the r-th pivot falls with the distance from the singular position;
+``stepping.watch`` monitors this pivot.  A redundant row has a pivot of α^(-1/2); where two rows exchange
+their roles, the larger of their pivots is still about α^(-1/4).
 """
 
 from __future__ import annotations
@@ -79,6 +81,23 @@ def factorise_constraints(memory):
 
 
 @kernel
+def factorise_positions(memory):
+    """Factorise S + I/α without rows between velocities alone, which do not restrict positions; return False
+    if no factor exists."""
+    velocity_rows, blocks = memory.equations.scene.velocity_rows, memory.equations.system.blocks
+    if velocity_rows.shape[0] == 0:
+        return factorise_constraints(memory)
+    kept = scratch_of(memory.chart).blocks
+    for row in velocity_rows:
+        copy(blocks[row], kept[row])
+        blocks[row] = 0.0
+    positive = factorise_constraints(memory)
+    for row in velocity_rows:
+        copy(kept[row], blocks[row])
+    return positive
+
+
+@kernel
 def keep_end(memory):
     """Save the gradient and the pivots of the last factor, for the start of the next step."""
     ends = memory.loop.ends
@@ -138,7 +157,7 @@ def newton_step(t, before, memory):
     violation, settings = largest(equations.rows.phi), equations.system.settings
     stale = before > SMALL or (violation > settings.newton_tolerance and violation > GOOD_REDUCTION * before)
     stale = stale or largest(scratch.correction) ** 2 > BENT * before
-    if stale and not factorise_constraints(memory):
+    if stale and not factorise_positions(memory):
         return FACTOR_FAILED
     scratch.correction[:] = 0.0
     if not violation <= settings.rounding:
@@ -193,10 +212,12 @@ def follow_last_correction(t, memory):
     """Compute rows and factor again if the last correction moved positions by more than rounding.
 
     This happens if the violation is rounding, but a light body next to a heavy body moves much farther than
-    rounding. Return False if no factor exists.
+    rounding. With rows between velocities alone, the factor is of all rows now. Return False if no factor
+    exists.
     """
     equations, state = memory.equations, memory.state
-    if not largest(scratch_of(memory.chart).correction) > MOVED * equations.system.settings.rounding:
+    moved = largest(scratch_of(memory.chart).correction) > MOVED * equations.system.settings.rounding
+    if not moved and equations.scene.velocity_rows.shape[0] == 0:
         return True
     evaluate(t, state.coordinates, state.velocities, equations)
     return factorise_constraints(memory)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from numpy import isnan
 
 from mbref.equations.coordinates import copy_state, fastest_turn
+from mbref.equations.evaluation import rate_of_row
 from mbref.equations.functions import end_of_pieces, select_pieces
 from mbref.equations.loads import advance_angles
 from mbref.kernels.compilation import INT, entry, kernel
@@ -58,6 +59,18 @@ def check_state(y, y_rate, memory):
     memory.loop.clock.violated_row = row
     if row >= 0 and abs(phi[row]) > memory.control.violation:
         return VIOLATED
+    return check_slip(memory)
+
+
+@kernel
+def check_slip(memory):
+    """Return VIOLATED if a wheel slips so fast that it would slip, in the time of the run, by more than a
+    position may violate its rows; otherwise OK."""
+    equations, span = memory.equations, memory.loop.times[-1]
+    for row in equations.scene.velocity_rows:
+        if abs(rate_of_row(row, memory.state.velocities, equations)) * span > memory.control.violation:
+            memory.loop.clock.violated_row = row
+            return VIOLATED
     return OK
 
 

@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 
 from crosscheck.engines.shared.spanning_tree import GROUND_LINK, Link, Tree, effective_mass, spanning_tree
 from mbref import rotations
-from mbref.scene import JOINT_TYPES, Body, Distance, Driver, Scene
+from mbref.scene import HOLONOMIC_JOINTS, Body, Distance, Driver, Scene
 from tests.helpers.parts import X, block, hinge, joint
 from tests.helpers.tree_scenes import INERTIA, body, every_joint, ring
 
-KINDS = tuple(JOINT_TYPES.values())
+KINDS = tuple(HOLONOMIC_JOINTS.values())
 ROUNDING = 1e-12  # of the largest value, after sums of up to 15 links
 CLOSURE_ROWS = {"point": 3, "weld": 6}
 

@@ -24,7 +24,7 @@ from crosscheck.judge.constraints import (
 )
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import JOINT_TYPES, Scene
+from mbref.scene import HOLONOMIC_JOINTS, Scene
 
 STEP = 2e-3  # m, rad, m/s or rad/s, of differences of the terms
 BETA = 10.0  # 1/s
@@ -69,7 +69,7 @@ class Faulty(Differentiating, Engine):
     """An engine with correct accelerations and a fault of their derivatives."""
 
     package = ""
-    supports = Supports(joints=tuple(JOINT_TYPES), couplings=("angle", "displacement"), powers=2)
+    supports = Supports(joints=tuple(HOLONOMIC_JOINTS), couplings=("angle", "displacement"), powers=2)
     differentiates_by = WAYS
 
     def __init__(self, fault: str):

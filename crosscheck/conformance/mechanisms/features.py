@@ -9,7 +9,7 @@ import numpy as np
 from crosscheck.judge.gauss_principle import rank
 from mbref import rotations
 from mbref.scene import (
-    JOINT_TYPES,
+    HOLONOMIC_JOINTS,
     Body,
     Driver,
     Factor,
@@ -43,7 +43,7 @@ CROSSING = ((0.0, 0.0, 1.0), (1.0, 0.3, 0.0))  # two axes at a right angle
 PLACES = {"anchor": PIVOT, "anchors": (PIVOT, (0.4, -0.1, 0.1)), "axes": CROSSING}
 JOINTS: Mapping[str, Joint] = {
     name: kind.at("J", LINK, **PLACES, axis=AXIS if kind.facts.free_rotations else ACROSS)
-    for name, kind in JOINT_TYPES.items()
+    for name, kind in HOLONOMIC_JOINTS.items()
 }
 PIVOTED, TURNS = JOINTS["revolute"], JOINTS["cylindrical"]
 LOADS: Mapping[str, Load] = {
@@ -71,7 +71,7 @@ FACTORS: Mapping[str, Factor] = {
 POLYNOMIAL, WAVE = (0.0, 0.8, -0.5), Sine(amplitude=0.2, frequency=6.0)
 DRIVERS = {
     name: Driver(joint="J", polynomial=POLYNOMIAL, sine=WAVE)
-    for name, kind in JOINT_TYPES.items()
+    for name, kind in HOLONOMIC_JOINTS.items()
     if kind.facts.driven
 }
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from crosscheck.refusals import FACTOR, Supports
-from mbref.scene import JOINT_TYPES, LOAD_TYPES
+from mbref.scene import HOLONOMIC_JOINTS, LOAD_TYPES
 
 EVERYTHING = Supports(
-    joints=tuple(kind for kind in JOINT_TYPES if kind not in ("inline", "free")),
+    joints=tuple(kind for kind in HOLONOMIC_JOINTS if kind not in ("inline", "free")),
     drivers=("angle", "displacement"),
     loads=tuple(LOAD_TYPES),
     couplings=("angle", "displacement"),

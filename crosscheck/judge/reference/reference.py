@@ -23,7 +23,7 @@ from crosscheck.judge.reference.motion import OVER, Motion, Times
 from crosscheck.judge.reference.piecewise import motion_by
 from crosscheck.judge.reference.taylor import DATA, natural_motion
 from crosscheck.judge.reference.tree import tree_motion
-from mbref.scene import Scene
+from mbref.scene import Scene, rolling_wheel
 
 SECONDS = 20.0
 Formulation = Callable[..., Motion]
@@ -37,6 +37,7 @@ SECOND_RUN_SEED = 1
 CONSISTENT = 32 * EXTENDED.eps
 SHARE = 0.4  # fraction of the remaining time for each run of A
 FIELDS = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
+ROLLS = "the wheel of joint {!r} rolls without slip, and no formulation of the reference has its equations"
 
 _computing: dict[str, Lock] = {}  # locks, keyed by the data that determine a motion
 
@@ -87,12 +88,22 @@ def reference(scene: Scene, times: Times, seconds: float = SECONDS) -> Reference
     request a scene, the first one computes it.  Raises SceneError if the scene's velocities contradict its
     joints.
     """
+    if wheel := rolling_wheel(scene):
+        return NoReference(ROLLS.format(wheel), 0.0, _nothing(scene))
     wanted = np.unique(np.asarray(times, dtype=float))
     with _computing.setdefault(cache.canonical(scene), Lock()):
         kept = _known(scene, wanted, seconds)
     there = np.isin(wanted, kept.samples.times)
     part = kept.samples.at(wanted[there])
     return part if there.all() else NoReference(kept.reason, kept.until(), part)
+
+
+def _nothing(scene: Scene) -> Reference:
+    """Return a reference without samples."""
+    sizes = {name: (0, len(scene.body), 4 if name == "orientation" else 3) for name in FIELDS}
+    arrays = {name: np.zeros(size) for name, size in sizes.items()}
+    none = np.zeros(0)
+    return Reference(times=none, **arrays, bound=none, both=none > 0, seconds=0.0, events=none)
 
 
 def _known(scene: Scene, wanted: np.ndarray, seconds: float) -> _Kept:

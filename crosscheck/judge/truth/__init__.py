@@ -28,7 +28,7 @@ from crosscheck.judge.truth.reference_truth import ReferenceTruth
 from crosscheck.judge.truth.slider import slider
 from crosscheck.judge.truth.spatial_slider_crank import spatial_slider_crank
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import JointLoad, Scene, TorsionSpring
+from mbref.scene import JointLoad, Scene, TorsionSpring, rolling_wheel
 
 PATHS: tuple[Callable[[Scene], Path | None], ...] = (
     parallelogram,
@@ -106,12 +106,12 @@ def closed_form(scene: Scene) -> Truth | None:
     """Return the truth of a scene of a known family, or None. The truth is cached with the part of the motion
     that is already solved.
 
-    No known family has couplings, intervals, armatures, tables, loads over time or, except torsion springs,
-    loads of joints.
+    No known family has couplings, intervals, armatures, rolling wheels, tables, loads over time or, except
+    torsion springs, loads of joints.
     """
     varies = any(load.over_time for load in scene.load) or any(ends(driver) for driver in scene.driver)
     pushed = any(isinstance(load, JointLoad) and not isinstance(load, TorsionSpring) for load in scene.load)
-    others = varies or pushed or scene.coupling or has_pieces(scene)
+    others = varies or pushed or scene.coupling or has_pieces(scene) or rolling_wheel(scene)
     if others or any(joint.reflected_inertia for joint in scene.joint):
         return None
     for family in PATHS:

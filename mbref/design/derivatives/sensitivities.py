@@ -34,7 +34,7 @@ from mbref.motions.motion import Motion
 from mbref.motions.outputs import UNIT_OF, quantity_of
 from mbref.motions.pieces import is_intermittent
 from mbref.motions.trajectory import Outcome
-from mbref.scene import Scene
+from mbref.scene import Scene, refuse_rolling
 from mbref.scenes import find_scene
 from mbref.simulation.simulate import SAMPLES, checked_times
 from mbref.stepping.limits import FINEST, Limits
@@ -180,6 +180,7 @@ class DerivativeRequest:
             scene = scene.with_(duration=float(self.samples[-1]))
         _refuse(scene, of, labels)
         self.scene, self.of, self.labels = scene, of or (), tuple(labels or ())
+        refuse_rolling(scene, "derivatives")
         self.model = Model(assembled(scene))
         if self.model.m > MOST_ROWS:
             count = f"{scene.name}: {self.model.m} constraint rows"

@@ -9,18 +9,20 @@ import numpy as np
 
 from mbref import rotations
 from mbref.motions.drawing import svg
-from mbref.motions.drawing.shapes import attack
+from mbref.motions.drawing.shapes import attack, rim
 from mbref.motions.drawing.svg import GREY, INK, PAPER
 from mbref.motions.drawing.timeline import Timeline
 from mbref.motions.drawing.view import Page
-from mbref.motions.joint_motion import position_of, positions_of
+from mbref.motions.joint_motion import position_of, positions_of, turned_since_start
 from mbref.motions.trajectory import Trajectory
 from mbref.rotations import Vector3
-from mbref.scene import GROUND, Coupling, Driver, Joint, Load, Scene
+from mbref.scene import GROUND, Coupling, Driver, Joint, Load, RollingLine, RollingWheel, Scene
 
 ACTION = "#b3261e"  # colour of loads and drivers
 STUB = 20.0  # px; half the length of an axis drawn at a joint
 ARROW = 52.0  # px; length of an arrow
+PATCH = 34.0  # px; half the length of a plane or line drawn at a joint
+IN_PLACE = np.zeros((1, 3))  # m; displacement of points that only move with their body
 FACING = 0.7  # cosine of the angle to the line of sight above which an axis is drawn as a point
 
 
@@ -36,9 +38,9 @@ class Stage(NamedTuple):
         """Return the pixels (k, 2) of a point (world, t = 0) of a body."""
         return self.page.pixels(position_of(self.scene, self.motion, body, point))
 
-    def points(self, body: str, points: np.ndarray) -> np.ndarray:
-        """Return the pixels (k, n, 2) of points (n, 3, world, t = 0) of a body."""
-        return self.page.pixels(positions_of(self.scene, self.motion, body, points.tolist()))
+    def points(self, body: str, points: np.ndarray, moved: np.ndarray = IN_PLACE) -> np.ndarray:
+        """Return the pixels (k, n, 2) of points (n, 3, world, t = 0) of a body, moved by vectors (k, 3)."""
+        return self.page.pixels(positions_of(self.scene, self.motion, body, points.tolist()) + moved[:, None])
 
     def along(self, body: str, point: Vector3, axis: np.ndarray, px: float) -> np.ndarray:
         """Return the pixels (k, 2, 2) of the ends of an axis through a point, each at most ``px`` away."""
@@ -57,7 +59,7 @@ class Stage(NamedTuple):
 def ground_mark(stage: Stage, joint: Joint) -> Iterator[str]:
     """Return a hatched triangle below a joint to the ground, or a dashed guide for a sliding joint; nothing
     for a joint that constrains nothing."""
-    if not joint.facts.rows:
+    if not joint.facts.rows or joint.facts.velocity_rows:
         return
     side = joint.bodies.index(GROUND)
     point = joint.anchor_pair[side]
@@ -99,6 +101,8 @@ def joint_mark(stage: Stage, joint: Joint) -> Iterator[str]:
         elif abs(axis @ stage.page.view.axes[2]) < 1 - 1e-9 and joint.type not in HIDDEN_AXES:
             ends = stage.along(body, point, axis, STUB)
             yield stage.line(ends, f'stroke="{INK}" stroke-width="1.2" stroke-dasharray="7 2 1 2"')
+    if isinstance(joint, RollingWheel):
+        yield from _wheel(stage, joint)
     if joint.type == "planar":
         yield from _plane(stage, names[0], first, rotations.unit(joint.directions[0]))
     yield stage.sign(names[1], second, SIGNS[joint.type])
@@ -111,22 +115,51 @@ def _sleeve(stage: Stage, body: str, point: Vector3, axis: np.ndarray) -> Iterat
     yield stage.line(inner, f'fill="none" stroke-linecap="butt" stroke="{PAPER}" stroke-width="11.6"')
 
 
-def _plane(stage: Stage, body: str, point: Vector3, normal: np.ndarray) -> Iterator[str]:
+def _wheel(stage: Stage, joint: RollingWheel) -> Iterator[str]:
+    """Return the plane or the line on which a wheel rolls, its rim, and a spoke."""
+    names, (contact, centre), points = joint.bodies, joint.anchor_pair, rim(joint)
+    below = _lowest_points(stage, joint) - position_of(stage.scene, stage.motion, names[0], contact)
+    if isinstance(joint, RollingLine):
+        half = np.array(joint.without_slip[0]) * PATCH / stage.page.scale
+        ends = stage.points(names[0], np.array([contact - half, contact + half]), below)
+        yield stage.line(ends, f'stroke="{GREY}" stroke-width="2"')
+    else:
+        yield from _plane(stage, names[0], contact, rotations.unit(joint.normal), below)
+    look = f'stroke="{INK}" stroke-width="1.6"'
+    yield stage.line(stage.points(names[1], points), look, closed=True)
+    yield stage.line(stage.points(names[1], np.array([centre, contact])), look)
+
+
+def _lowest_points(stage: Stage, joint: RollingWheel) -> np.ndarray:
+    """Return the positions (k, 3) of the lowest point of a wheel's rim."""
+    normal, axis = (
+        rotations.rotate(turned_since_start(stage.scene, stage.motion, body), rotations.unit(direction)[None])
+        for body, direction in zip(joint.bodies, joint.directions, strict=True)
+    )
+    up = normal - np.sum(normal * axis, axis=1, keepdims=True) * axis
+    centre = position_of(stage.scene, stage.motion, joint.bodies[1], joint.anchor)
+    return np.asarray(centre - joint.radius * up / np.linalg.norm(up, axis=1, keepdims=True))
+
+
+def _plane(
+    stage: Stage, body: str, point: Vector3, normal: np.ndarray, moved: np.ndarray = IN_PLACE
+) -> Iterator[str]:
     across = np.cross(normal, np.eye(3)[np.argmin(abs(normal))])
     across /= np.linalg.norm(across)
-    other, half = np.cross(normal, across), 34 / stage.page.scale
+    other, half = np.cross(normal, across), PATCH / stage.page.scale
     corners = np.array(point) + half * np.array(
         [across + other, across - other, -across - other, other - across]
     )
     look = f'stroke="{GREY}" fill="{GREY}" fill-opacity="0.15"'
-    yield stage.line(stage.points(body, corners), look, closed=True)
+    yield stage.line(stage.points(body, corners, moved), look, closed=True)
 
 
 def _ball(fill: str, radius: float = 5.5) -> str:
     return f'<circle r="{radius:g}" fill="{fill}" stroke="{INK}" stroke-width="1.8"/>'
 
 
-HIDDEN_AXES = ("planar", "inline", "free")  # types of joints whose axes are not drawn as a dashed line
+# types of joints whose axes are not drawn as a dashed line
+HIDDEN_AXES = ("planar", "inline", "free", "rolling", "rolling_line")
 SIGNS = {
     "fixed": f'<rect x="-5.5" y="-5.5" width="11" height="11" fill="{INK}"/>',
     "revolute": _ball(PAPER),
@@ -137,6 +170,8 @@ SIGNS = {
     "planar": _ball(GREY, 4),
     "inline": _ball(INK, 3.5),
     "free": _ball(ACTION, 3.5),
+    "rolling": _ball(PAPER, 3.5),
+    "rolling_line": _ball(PAPER, 3.5),
     "distance": _ball(PAPER, 3.5),
 }
 

@@ -11,13 +11,13 @@ from mbref.input_error import InputError
 from mbref.motions.drawing import svg
 from mbref.motions.drawing.labels import names
 from mbref.motions.drawing.marks import Stage, coupling_mark, driver_mark, ground_mark, joint_mark, load_mark
-from mbref.motions.drawing.shapes import Shape, anchors, at_rest, attack, shapes
+from mbref.motions.drawing.shapes import Shape, anchors, at_rest, attack, rim, shapes
 from mbref.motions.drawing.svg import COLOURS, GREY, INK, Picture
 from mbref.motions.drawing.timeline import Timeline
 from mbref.motions.drawing.view import BESIDE, Form, Page, View, round_length, view_of
-from mbref.motions.joint_motion import carried
+from mbref.motions.joint_motion import carried, positions_of
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import GROUND, Scene
+from mbref.scene import GROUND, RollingWheel, Scene
 
 FOOT, CLOCK = 30.0, 42.0  # px; heights of the row for axes and scale, and of the row for the line of time
 LEADING = 1.5  # height of a title line / height of its letters
@@ -192,7 +192,11 @@ def _page(scene: Scene, shown: Trajectory, view: View | None, form: Form) -> Pag
     fixed = [a for joint in scene.joint for name, a in anchors(joint) if name == GROUND]
     fixed += [p for load in scene.load for name, p in attack(load) if name == GROUND]
     bodies = [carried(shape.points, shown, b).reshape(-1, 3) for b, shape in enumerate(shapes(scene))]
-    points = np.concatenate([*bodies, np.array(fixed).reshape(-1, 3)])
+    wheels = [joint for joint in scene.joint if isinstance(joint, RollingWheel)]
+    rims = [
+        positions_of(scene, shown, wheel.bodies[1], rim(wheel).tolist()).reshape(-1, 3) for wheel in wheels
+    ]
+    points = np.concatenate([*bodies, *rims, np.array(fixed).reshape(-1, 3)])
     axes = [joint.axis for joint in scene.joint if joint.type == "revolute"]
     return Page.around(points, view or view_of(points, axes), form.width, form.margin, form.tallest)
 

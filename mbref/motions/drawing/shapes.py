@@ -8,8 +8,9 @@ import numpy as np
 
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import Body, Joint, Load, Scene
+from mbref.scene import Body, Joint, Load, RollingWheel, Scene
 
+RIM_POINTS = 72  # of a wheel's drawn rim
 FLAT = 1e-6  # thickness / size below which a body or mechanism is planar or straight
 
 
@@ -40,6 +41,15 @@ def shapes(scene: Scene) -> list[Shape]:
 def anchors(joint: Joint) -> list[tuple[str, tuple[float, float, float]]]:
     """Return body and anchor (world, t = 0) for both sides of a joint."""
     return list(zip(joint.bodies, joint.anchor_pair, strict=True))
+
+
+def rim(joint: RollingWheel) -> np.ndarray:
+    """Return points (n, 3) of the rim of a wheel (world, t = 0), the lowest one first."""
+    contact, centre = np.array(joint.anchor_pair)
+    down = contact - centre
+    across = np.cross(rotations.unit(joint.axis), down)
+    turns = np.linspace(0.0, 2.0 * np.pi, RIM_POINTS, endpoint=False)[:, None]
+    return np.asarray(centre + np.cos(turns) * down + np.sin(turns) * across)
 
 
 def attack(load: Load) -> list[tuple[str, tuple[float, float, float]]]:

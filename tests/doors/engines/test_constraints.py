@@ -16,7 +16,7 @@ from crosscheck.engines.sundials.equations import Equations
 from crosscheck.judge import constraints
 from mbref import rotations
 from mbref.equations.model import Model
-from mbref.scene import JOINT_TYPES, Scene
+from mbref.scene import HOLONOMIC_JOINTS, Scene
 from mbref.scenes import SCENES
 from tests.helpers.joint_strategies import DRIVABLE, one_joint_scenes
 from tests.helpers.measured import MARGIN, ROUNDING
@@ -25,7 +25,7 @@ from tests.helpers.truth_scenes import ALL, CLOSED
 
 SPACES = 2.1e-14  # measured difference of projections on row spaces, whose entries are at most 1
 ACCELERATIONS = 8e-13  # measured difference, over 1 + the largest acceleration
-KINDS = tuple(JOINT_TYPES.values())
+KINDS = tuple(HOLONOMIC_JOINTS.values())
 MECHANISMS = {scene.name: scene for scene in (every_joint(), driven(), ring("revolute"), ring("universal"))}
 # without the chain, whose redundant rows lead Newton's method from disturbed states to a singular position
 MECHANISMS |= {name: SCENES[name]() for name in CLOSED if name != "four_bar_chain"}

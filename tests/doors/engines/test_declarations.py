@@ -12,7 +12,7 @@ from crosscheck.engines.shared.spanning_tree import spanning_tree
 from crosscheck.judge.constraints import initial_poses, jacobian
 from mbref.equations.joints import ROWS_OF, primitives_of
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import JOINT_TYPES, Driver, JointFacts, Revolute, Scene
+from mbref.scene import HOLONOMIC_JOINTS, Driver, JointFacts, Revolute, Scene
 from mbref.scene.joints import JointEntry
 from mbref.scene.loads import LoadEntry
 
@@ -98,11 +98,11 @@ def test_reason_names_an_undeclared_driver_of_a_declared_joint() -> None:
     assert driven is not None and "'J'" in driven.reason and "angle" in driven.reason, driven
 
 
-@pytest.mark.parametrize("kind", JOINT_TYPES)
+@pytest.mark.parametrize("kind", HOLONOMIC_JOINTS)
 def test_a_joint_has_as_many_rows_in_all_equations_as_its_facts_say(kind: str) -> None:
     """``facts.rows`` is 6 less the freedoms: the rows of mbref and adapters, the rank of the judge's
     Jacobian, and 6 less the coordinates of the joint in a tree, where no distance joint is."""
-    joint, facts = JOINTS[kind], JOINT_TYPES[kind].facts
+    joint, facts = JOINTS[kind], HOLONOMIC_JOINTS[kind].facts
     scene = Scene(name="one", body=(BODY,), joint=(joint,))
     assert facts.rows + facts.free_translations + facts.free_rotations == 6, facts
     found = {

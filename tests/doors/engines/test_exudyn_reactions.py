@@ -7,7 +7,7 @@ from crosscheck.engine import Setting
 from crosscheck.engines.exudyn.adapter import ENGINE
 from crosscheck.judge.reaction_balance import balance
 from mbref.motions.trajectory import Outcome
-from mbref.scene import JOINT_TYPES, Driver, Moment, Revolute, Scene, Sine
+from mbref.scene import HOLONOMIC_JOINTS, Driver, Moment, Revolute, Scene, Sine
 from tests.helpers.measured import MARGIN
 from tests.helpers.parts import X
 from tests.helpers.tree_scenes import body
@@ -16,7 +16,7 @@ SIDEWAYS = (0.6, 0.0, 0.8)  # an axis along no coordinate axis
 BODY = body("b", (0.0, 0.2, 0.0), (0.3, -0.5, 0.8), mass=2.0)
 ANCHOR, OTHER = (0.1, 0.1, -0.2), (0.3, -0.1, 0.1)
 PLACES = {"anchor": ANCHOR, "anchors": (ANCHOR, OTHER), "axis": SIDEWAYS, "axes": (X, (0.0, 1.0, 1.0))}
-HOLDING = {name: kind for name, kind in JOINT_TYPES.items() if kind.facts.rows}  # not free joints
+HOLDING = {name: kind for name, kind in HOLONOMIC_JOINTS.items() if kind.facts.rows}  # not free joints
 UNDRIVEN = [(name, False) for name in HOLDING]
 DRIVEN = [(name, True) for name, kind in HOLDING.items() if kind.facts.driven]
 
@@ -31,7 +31,7 @@ def test_exudyns_reaction_causes_the_acceleration_of_the_body(kind, driven, bodi
         name="held",
         body=(BODY,),
         gravity=(1.0, -9.81, 2.0),
-        joint=(JOINT_TYPES[kind].at("J", bodies, **PLACES),),
+        joint=(HOLONOMIC_JOINTS[kind].at("J", bodies, **PLACES),),
         driver=(Driver(joint="J", polynomial=(0.0, 3.0)),) if driven else (),
         load=(Moment(body="b", moment=(0.3, 0.5, -0.4)),),
     )

@@ -25,12 +25,12 @@ from tests.helpers.measured import MARGIN, ROUNDING
 
 
 def test_probes_have_every_type_of_joint_load_and_driver():
-    """The scene format's classes declare the types."""
+    """The scene format's classes declare the types. Wheels, which only mbref simulates, have no probe."""
 
     def kinds(union) -> set[str]:
         return {kind.model_fields["type"].default for kind in union.__args__[0].__args__}
 
-    assert set(JOINTS) == kinds(Joint), set(JOINTS) ^ kinds(Joint)
+    assert set(JOINTS) == kinds(Joint) - {"rolling", "rolling_line"}, set(JOINTS) ^ kinds(Joint)
     assert set(LOADS) == kinds(Load), set(LOADS) ^ kinds(Load)
     scenes = feature_scenes()
     assert {f"{kind} driver" for kind in DRIVABLE} <= set(scenes), list(scenes)

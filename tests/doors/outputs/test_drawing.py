@@ -241,6 +241,7 @@ def test_every_joint_type_is_drawn_by_a_sign_of_its_own():
     """Pictures of two bodies with a joint of each type between them differ from each other."""
     assert set(SIGNS) == set(JOINT_TYPES)
     ends = {"anchor": X, "anchors": [X, [2.0, 0, 0]], "axis": Z, "axes": [Z, Y]}
+    ends |= {"normal": Y, "along": X, "radius": 0.3}
     bodies = [{"name": n, "position": [x, 0.2, 0.1]} for n, x in (("a", 0.5), ("b", 1.5))]
     pictures = set()
     for joint in JOINT_TYPES.values():
