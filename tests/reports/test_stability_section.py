@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 from crosscheck.cli.collection import stored_ladders
-from crosscheck.judge.truth import closed_form
 from crosscheck.study import stability
 from mbref.records import rewrite
 from reports import __main__ as program
@@ -25,16 +24,6 @@ def record(ladder, difficulty, error, outcome="COMPLETED", engine="mbref", famil
         "outcome": outcome,
         "metrics": {"error": error},
     }
-
-
-def test_name_of_a_scene_of_a_stability_ladder_states_its_ladder_and_difficulty():
-    """A ladder is a mechanism at several difficulties, 60 scenes or more. Each has a closed form."""
-    scenes = stability.scenes()
-    assert len(scenes) == sum(len(ladder.rungs) for ladder in stability.ladders()) > 60
-    for scene in scenes:
-        ladder, difficulty = stability.place(scene.name)
-        assert stability.scene_name(ladder, difficulty) == scene.name
-        assert closed_form(scene) is not None, f"{scene.name} has no closed form"
 
 
 def test_stability_table_counts_right_ended_and_wrong_runs(snapshot):

@@ -145,19 +145,17 @@ COSTS, ERRORS = [1.0, 10.0, 100.0, 50.0], [1e-2, 1e-4, 1e-6, 1e-3]  # error = 1e
 
 
 @pytest.mark.parametrize(
-    ("level", "cost"),
-    [(1e-5, 10**1.5), (0.5, 1.0), (1e-7, None)],
-    ids=["between two runs", "above the cheapest run's error", "below all errors"],
+    ("costs", "errors", "level", "cost"),
+    [
+        *((COSTS, ERRORS, level, cost) for level, cost in ((1e-5, 10**1.5), (0.5, 1.0), (1e-7, None))),
+        ([1.0, 2.0], [0.5, math.inf], 1.0, 1.0),
+        ([1.0, 2.0], [math.nan, math.inf], 1.0, None),
+    ],
+    ids=["between two runs", "above all errors", "below all errors", "one finite error", "no finite error"],
 )
-def test_cost_at_an_error_is_read_on_the_lower_envelope_of_the_runs(level, cost):
+def test_cost_at_an_error_is_read_on_the_lower_envelope_of_the_runs(costs, errors, level, cost):
     """Errors are 1e-2 / cost² on the envelope, from cost 1 on; a worse run has no effect; none has 1e-7."""
-    assert cost_at_error(COSTS, ERRORS, level) == pytest.approx(cost)
-
-
-def test_runs_without_a_finite_error_have_no_cost_at_an_error():
-    """None stands for no cost; a single finite error, 0.5, has the cost of its run."""
-    assert cost_at_error([1.0, 2.0], [0.5, math.inf], 1.0) == 1.0
-    assert cost_at_error([1.0, 2.0], [math.nan, math.inf], 1.0) is None
+    assert cost_at_error(costs, errors, level) == pytest.approx(cost)
 
 
 def test_energy_error_is_none_for_a_mechanism_at_rest():

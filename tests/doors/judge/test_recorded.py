@@ -216,18 +216,6 @@ def test_angle_of_millions_of_turns_is_right_within_its_rounding(duration):
     assert not judge_motion(scene, {"time": times, "A.angle": angle}).is_right
 
 
-def test_reference_command_writes_a_table_that_judge_finds_right(tmp_path, capsys):
-    """The status is 0. With another order of quaternions it is 1, and the explanation names this order."""
-    SCENE.save(tmp_path / "s.toml")
-    scene, out = str(tmp_path / "s.toml"), str(tmp_path / "ref.csv")
-    assert main(["reference", scene, "--out", out, "--samples", "81"]) == 0
-    assert "81 samples to t = 0.4 s, error at most" in capsys.readouterr().out
-    assert main(["judge", scene, out]) == 0
-    assert main(["judge", scene, out, "--quaternion", "xyzw"]) == 1
-    printed = capsys.readouterr().out
-    assert " off " in printed and "[bold]" not in printed and "quaternions in the order" in printed
-
-
 def test_judge_command_ends_with_status_2_for_what_it_cannot_read(tmp_path):
     """A tolerance that is negative or no number, a column without a number, a file that does not exist."""
     SCENE.save(tmp_path / "s.toml")

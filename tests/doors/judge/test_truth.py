@@ -9,10 +9,9 @@ from scipy.integrate import quad
 
 from crosscheck.judge.truth import NoSolution, truth_for
 from mbref import rotations
-from mbref.scene import Body, Driver, Revolute, Scene, TorsionSpring
+from mbref.scene import Body, Driver, Scene
 from mbref.scenes import SCENES
 from tests.helpers.parts import Z, hinge, spring
-from tests.helpers.truth_scenes import pendulum
 
 ROUNDED = 1e-14  # m or rad: some roundings of numbers up to 1
 
@@ -77,22 +76,6 @@ def test_equal_slider_crank_turns_by_the_energy_quadrature(name):
     slider = motion.poses(np.array([end])).position[0, 2, 0]
     assert abs(slider - 2 * a * math.cos(theta)) < 10 * ROUNDED, f"slider at {slider}"
     assert theta > 3.5 * math.pi
-
-
-@pytest.mark.parametrize("sign", [1, -1])
-def test_torsion_pendulum_is_the_damped_oscillator(sign):
-    """θ = ±7 (1 - e^(-δt) (cos ωt + δ/ω sin ωt)) rad, of natural angle 7 rad, whose sign follows the order of
-    the joint's bodies. Data: 5 N m/rad, 0.3 N m s/rad, 0.4 kg m² about the pivot; to 1e-13 rad."""
-    pair = ("ground", "bar") if sign > 0 else ("bar", "ground")
-    pivot = Revolute(name="pivot", bodies=pair, anchor=(0.0, 0.0, 0.0), axis=(0, 0, 2.0))
-    spring = TorsionSpring(joint="pivot", stiffness=5.0, damping=0.3, natural_angle=7.0)
-    scene = pendulum(joint=(pivot,), load=(spring,), duration=3.0)
-    t = np.linspace(0, 3.0, 40)
-    inertia = 0.1 + 1.2 * 0.25
-    decay, w = 0.3 / (2 * inertia), math.sqrt(5.0 / inertia - (0.3 / (2 * inertia)) ** 2)
-    angle = sign * (7.0 - 7.0 * np.exp(-decay * t) * (np.cos(w * t) + decay / w * np.sin(w * t)))
-    got = truth_for(scene).coordinate(t)[:, 0]
-    assert np.abs(got - angle).max() < 10 * ROUNDED, f"angle off by {np.abs(got - angle).max()}"
 
 
 def test_truth_ends_where_a_spring_has_no_length():

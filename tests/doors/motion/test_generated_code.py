@@ -1,16 +1,9 @@
 """Machine code generated for a scene against the general kernels, which serve every scene. The general
 kernels are the truth here; other tests compare them with closed forms."""
 
-import os
-import shutil
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-import mbref
 from mbref.kernels.compilation import PLAIN
 
 if PLAIN:
@@ -92,32 +85,3 @@ def test_generated_code_of_low_and_high_orders_moves_as_the_general_kernels(orde
     """Errors of the truncated series, about rtol 1e-5, are equal in both, so that rounding is left."""
     scene = SCENES["spatial_slider_crank_gravity"]()
     assert difference(scene, Method.parse(f"taylor[order={order}]"), rtol=1e-5) <= ROUNDING
-
-
-WITHOUT = """
-import importlib.util
-from mbref.method import MethodError
-from mbref.scenes import SCENES
-from mbref.simulation.simulate import Limits, simulate
-from mbref.motions.trajectory import Outcome
-assert importlib.util.find_spec("mbref.taylor.generated") is None
-for code in ("auto", "generic"):
-    motion = simulate(SCENES["four_bar"](), "taylor", [0.0, 0.01], Limits(code=code))
-    assert motion.outcome == Outcome.COMPLETED, motion.message
-try:
-    simulate(SCENES["four_bar"](), "taylor", [0.1], Limits(code="generated"))
-except MethodError as reason:
-    assert "mbref.taylor.generated is not installed" in str(reason)
-else:
-    raise AssertionError("generated code is optional, but asked for")
-"""
-
-
-def test_mbref_runs_without_the_optional_generator_of_code(tmp_path):
-    """A copy without mbref/taylor/generated runs by the general kernels, and refuses code="generated"."""
-    package = Path(mbref.__file__).parent
-    shutil.copytree(package, tmp_path / "mbref", ignore=shutil.ignore_patterns("generated", "__pycache__"))
-    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(tmp_path)}
-    command, texts = [sys.executable, "-P", "-c", WITHOUT], {"capture_output": True, "text": True}
-    done = subprocess.run(command, cwd=tmp_path, env=environment, check=False, **texts)
-    assert done.returncode == 0, done.stderr

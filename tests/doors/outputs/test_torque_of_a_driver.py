@@ -8,7 +8,7 @@ import pytest
 from crosscheck.engine import engine, installed
 from mbref import Motion, Scene, find_scene, simulate
 from mbref.cli.commands import main
-from tests.helpers.parts import Entry, Point, X, Z, hinge, joint, slide
+from tests.helpers.parts import Entry, Point, Z, hinge, joint
 from tests.helpers.statics import rod
 
 TIMES = np.linspace(0.0, 0.8, 9)
@@ -43,24 +43,6 @@ def wheels(*armatures: float, bodies=("ground", "w{}"), axis: Point = Z) -> tupl
     ]
 
 
-@pytest.mark.parametrize("method", ["taylor", "alf-dual+projection", "lm1+projection"])
-@pytest.mark.parametrize(("bodies", "axis"), [(("ground", "w{}"), Z), (("w{}", "ground"), (0.0, -3.0, 4.0))])
-def test_motor_accelerates_its_wheel_and_its_armature(bodies, axis, method):
-    """Torque (J + I) φ'', J = 0.1, I = 2.3 kg m², for any order and axis; a hinge has no driving force."""
-    found = moved(*wheels(2.3, bodies=bodies, axis=axis), method).driver("A")
-    assert_equal(found.torque, (0.1 + 2.3) * SECOND)
-    assert_equal(found.power, (0.1 + 2.3) * SECOND * RATE)
-    assert found.force is None
-
-
-@pytest.mark.parametrize(("pair", "ratio"), [("AB", -3.0), ("BA", -1 / 3)])
-def test_motor_of_a_wheel_drives_the_wheel_that_meshes_with_it(pair, ratio):
-    """The motor feels J + I + n² (J' + I'): B turns n = -3 times as fast as A, whichever is listed first."""
-    mesh = [{"name": "mesh", "joints": [*pair], "ratio": ratio}]
-    found = moved(*wheels(0.4, 0.7), coupling=mesh).driver("A")
-    assert_equal(found.torque, (0.1 + 0.4 + 3.0**2 * (0.2 + 0.7)) * SECOND)
-
-
 def test_motor_lifts_a_nut_by_its_screw():
     """The thread moves the nut by p φ against gravity: (J + I + p² m) φ'' + m g p."""
     mass, inertia, armature, pitch = 1.4, 0.05, 0.3, 0.2
@@ -70,22 +52,6 @@ def test_motor_lifts_a_nut_by_its_screw():
     found = moved(nut, [screw], coupling=thread, gravity=[0.0, 0.0, -G]).driver("A")
     assert_equal(found.torque, (inertia + armature + pitch**2 * mass) * SECOND + mass * G * pitch)
     assert_equal(found.power, found.torque * RATE)
-
-
-def test_driven_rack_turns_its_pinion():
-    """Force of the rack: (m + I + (J + I') / r²) x'' - m g, with g = 3 m/s² along it; I' is the pinion's
-    rotor. A slide has a driving force and no torque (None)."""
-    radius, mass, armature, inertia, rotor = 0.25, 2.0, 1.1, 0.06, 0.04
-    bodies = [rod("rack", (0.0, 0.4, 0.0), mass, 0.1), rod("pinion", (0.0, 0.0, 0.0), 1.0, inertia)]
-    joints = [
-        slide("A", "ground", "rack", (0.0, 0.4, 0.0), X, armature=armature),
-        hinge("B", "ground", "pinion", (0.0, 0.0, 0.0), armature=rotor),
-    ]
-    teeth = [{"name": "teeth", "joints": ["B", "A"], "ratio": radius}]
-    found = moved(bodies, joints, coupling=teeth, gravity=[3.0, -G, 0.0]).driver("A")
-    assert_equal(found.force, (mass + armature + (inertia + rotor) / radius**2) * SECOND - 3.0 * mass)
-    assert_equal(found.power, found.force * RATE)
-    assert found.torque is None
 
 
 def test_driver_delivers_what_spring_and_torque_of_its_joint_leave_over():

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize, root
+from scipy.optimize import minimize
 
 from mbref import Scene, equilibria
 from mbref.cli.commands import main
@@ -153,55 +153,6 @@ def test_chain_that_a_stiff_spring_holds_is_found_in_both_stable_poses(is_on_sli
         assert min(np.abs(place - centres(lengths, least)[2]).max() for place in stable) < 0.01
 
 
-def test_chain_with_elbows_of_different_stiffness_is_found_after_they_have_straightened():
-    """Springs of 3e6 and 6e7 N m/rad begin 0.15 and 0.47 rad from their natural angles; a spring of 2e4 N/m
-    holds the end. At rest both elbows are at their natural angles to 1e-5 rad. The energy of the chain with
-    rigid elbows has two variables, and scipy's least value of it is a stable pose, to 0.1 mm."""
-    lengths, masses = np.array([0.8, 0.6, 0.5, 0.7]), np.array([2.0, 1.0, 0.5, 1.5])
-    start = np.array([2.1, 3.1, 1.8, 3.0])
-    fixed, stiffness, length, natural = np.array([1.3, -1.0, 0.0]), 2e4, 1.3, (0.15, 0.47)
-
-    def bent(free):
-        third = free[1] + start[2] - start[1] + natural[0]
-        return np.array([*free, third, third + start[3] - start[2] + natural[1]])
-
-    def energy(free):
-        places = centres(lengths, bent(free))
-        longer = np.linalg.norm(ends(places)[-1] - fixed) - length
-        return masses @ places[:, 1] * G + stiffness * longer**2 / 2
-
-    least = minimize(energy, start[:2], method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-12}).x
-    elbows = [
-        {"type": "torsion_spring", "joint": f"J{k}", "stiffness": k_phi, "natural_angle": angle}
-        for k, k_phi, angle in zip((2, 3), (3e6, 6e7), natural, strict=True)
-    ]
-    tip = ends(centres(lengths, start))[-1]
-    holder = parts.spring("ground", fixed, "b3", tip, stiffness, length)
-    found = equilibria(rods(lengths, masses, start, [*elbows, holder]), starts=2)
-    stable = [each.scene.body[3].position for each in found if each.stability == "stable"]
-    assert min(np.abs(place - centres(lengths, bent(least))[3]).max() for place in stable) < 1e-4
-
-
-def test_rod_on_a_stiff_slide_along_a_pendulum_is_found_hanging():
-    """The search begins with the pendulum at 1 rad and the rod at 0.5 rad. At rest both hang; block and rod,
-    of 0.5 kg and 1 kg, extend the slide's spring by m g / k."""
-    stiffness = 1e9
-    along, aside = (np.array([np.sin(a), -np.cos(a), 0.0]) for a in (1.0, 0.5))
-    at = 0.8 * along
-    bodies = [rod("pendulum", 0.5 * along), rod("block", at, 0.5, 0.01), rod("hanging", at + aside / 2, 1.0)]
-    joints = [
-        hinge("A", ("ground", "pendulum")),
-        parts.slide("S", "pendulum", "block", tuple(at), tuple(along)),
-        hinge("B", ("block", "hanging"), at.tolist()),
-    ]
-    load = {"type": "slide_spring", "joint": "S", "stiffness": stiffness}
-    scene = Scene(name="slides", gravity=DOWN, body=bodies, joint=joints, load=[load])
-    [found] = equilibria(scene, starts=1)
-    assert found.stability == "stable"
-    depth = 0.8 + 1.5 * G / stiffness
-    assert np.allclose(found.scene.body[2].position, (0.0, -depth - 0.5, 0.0), rtol=0.0, atol=CLOSE)
-
-
 def test_modes_without_the_driver_of_a_pendulum_are_its_free_vibration(tmp_path, capsys):
     """The frequency is √(m g l / J) / 2π with the moment of inertia J about the hinge."""
     path = tmp_path / "driven.toml"
@@ -226,27 +177,6 @@ def test_tackle_in_balance_is_one_indifferent_equilibrium_with_eigenvalues_zero(
     scene = Scene(name="tackle", gravity=DOWN, body=bodies, joint=joints, coupling=[rope])
     [each] = equilibria(scene, starts=6)
     assert each.stability == "indifferent" and not each.eigenvalues.any() and not len(each.frequencies)
-
-
-def test_springs_wound_by_many_turns_unwind_to_the_equilibrium_near_their_natural_angles():
-    """Rods of 2 kg and 1 kg on each other: kᵢ (φᵢ - φ₀ᵢ) balances the weights' moments about both hinges. The
-    scene of the equilibrium has the remaining twists φ₀ - φ: a turn more or less is 6.28 rad."""
-    stiffness, natural = np.array([60.0, 40.0]), 2 * np.pi * np.array([-40, 60]) + (0.4, -0.7)
-    chain = rods(np.array([1.0, 0.8]), np.array([2.0, 1.0]), np.array([0.5, 0.5]) * np.pi, [])
-    springs = [
-        spring(k, natural_angle=angle) | {"joint": joint}
-        for k, angle, joint in zip(stiffness.tolist(), natural.tolist(), ("J0", "J1"), strict=True)
-    ]
-    [each] = equilibria(chain.with_(load=springs), starts=1)
-
-    def moments(twists):
-        first, second = np.cumsum(natural - twists)  # angles of the rods from the horizontal
-        lower = 0.4 * G * np.cos(second)
-        return stiffness * twists - (2.0 * G * np.cos(first) + lower, lower)
-
-    assert each.stability == "stable"
-    remaining = [load.natural_angle for load in each.scene.load]
-    assert remaining == pytest.approx(root(moments, np.zeros(2), tol=1e-13).x, abs=CLOSE)
 
 
 @pytest.mark.parametrize(
