@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, Owner, Setting
+from crosscheck.engine import Cannot, Owner, Setting
 from mbref.motions.trajectory import Cost, Outcome, Trajectory
 from mbref.scene import Scene
 from tests.helpers.still_engines import Still
@@ -262,28 +262,6 @@ class Elsewhere(Fake):
         return replace(trajectory, position=trajectory.position + 1e-3)
 
 
-class LosesLoads(Engine):
-    """Pinocchio, given scenes without their loads."""
-
-    name, package = "loses loads", "pin"
-
-    def version(self) -> str:
-        return "1"
-
-    def cannot(self, scene: Scene) -> Cannot | None:
-        return None
-
-    def settings(self, scene: Scene) -> Sequence[Setting]:
-        from crosscheck.engines.pinocchio import ENGINE
-
-        return ENGINE.settings(scene)
-
-    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        from crosscheck.engines.pinocchio import ENGINE
-
-        return replace(ENGINE.run(scene.with_(load=()), times, setting), engine=self.name, version="1")
-
-
 class LastOneRuns(Fake):
     """Has four families, of which the last completes."""
 
@@ -306,7 +284,7 @@ SLOW, STUCK, COMPILING, SEARCHING = Slow(), Stuck(), Compiling(), Searching()
 NO_SETTINGS, REFUSING = NoSettings(), Refusing()
 MALFORMED, SCALARS, VERSIONLESS, VARYING = Malformed(), Scalars(), Versionless(), Varying()
 COMPILING_MODELS = CompilingModels()
-LOSES_LOADS, LAST_ONE_RUNS, ELSEWHERE = LosesLoads(), LastOneRuns(), Elsewhere()
+LAST_ONE_RUNS, ELSEWHERE = LastOneRuns(), Elsewhere()
 
 
 def computing(seconds: float) -> None:

@@ -47,9 +47,3 @@ def test_free_fall_by_low_order_violates_no_check_but_does_with_twice_the_gravit
     """The steps of both methods are accurate enough for a free body; the planted fault is none of theirs."""
     assert failures(step, ["free_fall"]) == []
     assert failures(step, ["free_fall"], "gravity acts twice")
-
-
-@pytest.mark.parametrize("step", [symplectic_euler, midpoint])
-def test_engine_of_low_order_that_ignores_armature_violates_a_check_on_a_pendulum_with_armature(step: Step):
-    """A quick case of the slow tests above: the accelerations lack the armature, whatever the steps are."""
-    assert failures(step, ["armature pendulum"], "armature is ignored")

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from crosscheck.conformance.mechanisms.random_scenes import mechanism
 from crosscheck.engine import Setting
 from crosscheck.engines.exudyn.adapter import ENGINE
 from crosscheck.engines.exudyn.singular_crossing import UPRIGHT, extrapolated_states, projected
@@ -10,7 +9,6 @@ from crosscheck.judge.constraints import closure, closure_rates, initial_poses
 from crosscheck.judge.metrics import error_series
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
-from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from tests.helpers.measured import MARGIN, ROUNDING
@@ -28,18 +26,6 @@ def test_exudyns_samples_at_and_next_to_a_singular_position_are_true():
     assert np.array_equal(run.times, times), (run.times, run.message)
     errors = error_series(scene, run, truth_for(scene).poses(times))
     assert errors.max() < MARGIN * 2.8e-12, f"errors {errors} around the singular position"
-
-
-def test_exudyns_runs_through_a_singular_position_repeat_to_the_bit():
-    """Newton's iteration stalls at 0.0494 s of mechanism 27; extrapolation goes on. Three runs are equal."""
-    scene = mechanism(27)
-    times = np.linspace(0, scene.duration, 9)
-    setting = [setting for setting in ENGINE.settings(scene) if setting.family == "tuned"][-1]
-    first, *others = [ENGINE.run(scene, times, setting) for _ in range(3)]
-    assert first.outcome is Outcome.COMPLETED, first.message
-    for other in others:
-        assert np.array_equal(first.position, other.position), np.abs(first.position - other.position).max()
-        assert np.array_equal(first.velocity, other.velocity), np.abs(first.velocity - other.velocity).max()
 
 
 def true_nodes(scene: Scene, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

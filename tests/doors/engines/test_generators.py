@@ -1,8 +1,6 @@
 """Engines with generated code, CasADi and heyoka: true motions, refusals, and files in the cache. Runs are in
 child processes: CasADi and OpenSim do not share one."""
 
-import subprocess
-import sys
 from importlib.util import find_spec
 
 import numpy as np
@@ -118,16 +116,3 @@ def test_a_file_in_the_cache_is_found_by_its_origin_unless_it_is_damaged(tmp_pat
     assert file_cache.stored("folder", "other", ".txt") is None
     path.write_text("damaged")
     assert file_cache.stored("folder", "origin", ".txt") is None
-
-
-def test_a_compiled_library_in_the_cache_is_used_by_another_process(tmp_path, monkeypatch):
-    """Only the first process imports CasADi, which generates the code; the cache has one library."""
-    needs("casadi")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.delenv("LD_LIBRARY_PATH", raising=False)  # where OpenSim, once imported, has another CasADi
-    code = "import sys; from crosscheck.engines.casadi import library; from mbref.scenes import SCENES\n"
-    code += "library.library(SCENES['planar_slider_crank_gravity'](), 0.0); print('casadi' in sys.modules)"
-    command = [sys.executable, "-c", code]
-    imported = [subprocess.run(command, capture_output=True, check=True).stdout for _ in range(2)]
-    assert imported == [b"True\n", b"False\n"]
-    assert len(list((tmp_path / "mbref" / "casadi").iterdir())) == 1

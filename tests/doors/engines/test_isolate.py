@@ -88,14 +88,6 @@ def test_every_observed_run_has_a_process_of_its_own_that_ends(tmp_path: Path):
     assert all(is_gone(process) for process in processes), processes
 
 
-def test_an_observed_run_that_hangs_is_killed_with_the_processes_that_it_started(tmp_path: Path):
-    """The engine HANG starts a process, writes its number into a file and sleeps; the limit is 2 s."""
-    pid = tmp_path / "pid"
-    ended = observe(f"{FAKES}:HANG", still(str(pid)), TIMES, PLAIN, 2.0).value
-    assert (ended.outcome, ended.message) == (Outcome.TIMED_OUT, "no result after 2 s"), ended.message
-    assert is_gone(int(pid.read_text())), f"grandchild {pid.read_text()} is still alive"
-
-
 def test_output_and_files_of_an_engine_do_not_reach_the_parent_process(capfd, tmp_path, monkeypatch):
     """CHATTER prints and writes a file into its working folder."""
     monkeypatch.chdir(tmp_path)

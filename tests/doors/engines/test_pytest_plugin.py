@@ -43,13 +43,6 @@ def test_resume_repeats_no_test_that_passed_before(tmp_path):
     assert held(tmp_path, "free_fall").returncode == 1
 
 
-def test_plugin_finds_an_engine_of_the_working_directory_in_child_processes(tmp_path):
-    """PYTHONPATH does not name the working directory; without --in-process the engine runs in children."""
-    (tmp_path / "spatial_engine.py").write_text(SOURCE.read_text())
-    run = held(tmp_path, "free_fall and refusal", path=str(ROOT))
-    assert run.returncode == 0 and " passed" in run.stdout, run.stdout[-1500:] + run.stderr[-500:]
-
-
 @pytest.mark.parametrize(
     ("name", "says"),
     [("no_such_module:ENGINE", "No module named 'no_such_module'"), ("nothing", "unknown engine 'nothing'")],

@@ -15,7 +15,6 @@ from pathlib import Path
 import pytest
 
 from mbref.kernels import checked_file, disk_cache, safe_folder
-from mbref.kernels.compilation import PLAIN
 from mbref.simulation.simulate import simulate
 
 ROOT = Path(__file__).parents[3]
@@ -34,9 +33,6 @@ def shifted(x):
     return twice(x) + 1.0
 
 print(shifted(3.0))
-"""
-COUNT_COMPILATIONS = """
-print(shifted.pointer.stats.cache_misses.total())
 """
 SCENE = """
 import sys
@@ -261,48 +257,12 @@ def test_program_runs_without_a_writable_cache(script, says, tmp_path: Path):
     assert out == says and "cannot write to" in error and "Traceback" not in error, error
 
 
-def test_one_of_two_processes_compiles_a_kernel(tmp_path: Path):
-    """Each prints 7.0 and its number of compilations: one compiles, the other waits and loads the result."""
-    cache, program = tmp_path / "cache", tmp_path / "program.py"
-    program.write_text(SMALL_KERNEL.format(root=str(ROOT)) + COUNT_COMPILATIONS)
-    command, env = [sys.executable, str(program)], compiling(cache)
-    both = [subprocess.Popen(command, env=env, stdout=subprocess.PIPE, text=True) for _ in range(2)]
-    said = [process.communicate()[0] for process in both]
-    assert sorted(said) == ["7.0\n0\n", "7.0\n1\n"]
-
-
 @pytest.mark.parametrize("program", ["mbref", "crosscheck"])
 def test_printing_help_creates_no_cache(program, tmp_path: Path):
     """NUMBA_CACHE_DIR names a folder that is not there before, nor after."""
     command = [sys.executable, "-m", program, "--help"]
     subprocess.run(command, env=compiling(tmp_path / "cache"), cwd=ROOT, capture_output=True, check=True)
     assert not (tmp_path / "cache").exists()
-
-
-@pytest.mark.skipif(PLAIN, reason="without the JIT nothing is compiled")
-def test_second_run_of_a_scene_compiles_nothing():
-    """numba announces each compilation by the event numba:compile. The second process prints the event of its
-    own function ``control``, and none of its run."""
-    simulate("four_bar_gravity", times=[0.01])
-    code = """
-import mbref, numba
-from numba.core.event import Listener, register
-
-class Shown(Listener):
-    def on_start(self, event):
-        print(event.data["dispatcher"].py_func.__name__)
-    def on_end(self, event):
-        pass
-
-def control():
-    return 1
-
-register("numba:compile", Shown())
-mbref.simulate("four_bar_gravity", times=[0.01])
-numba.njit(control)()
-"""
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert run.stdout.split() == ["control"]
 
 
 def test_second_run_of_a_scene_imports_neither_scipy_sparse_nor_scipy_integrate():

@@ -5,11 +5,9 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
-import psutil
 import pytest
 
 from crosscheck.engine import Setting
@@ -109,22 +107,6 @@ def test_program_and_its_processes_end_when_sigkill_ends_the_parent(tmp_path: Pa
     """SIGKILL cannot be passed on by the parent; the operating system ends its children."""
     _, program, started = parent_ended_by(signal.SIGKILL, tmp_path)
     assert is_gone(program) and is_gone(started)
-
-
-def test_report_ends_with_the_command_that_sigkill_ends(tmp_path: Path):
-    """`crosscheck report` runs a program of its own, which waits for its scene from a pipe."""
-    scene, end = tmp_path / "scene.toml", time.monotonic() + PATIENCE
-    os.mkfifo(scene)
-    with subprocess.Popen([sys.executable, "-m", "crosscheck", "report", scene], cwd=tmp_path) as command:
-        pipe = -1
-        while pipe < 0 and time.monotonic() < end:
-            with suppress(OSError):  # nobody reads yet
-                pipe = os.open(scene, os.O_WRONLY | os.O_NONBLOCK)
-            time.sleep(0.02)
-        programs = [process.pid for process in psutil.Process(command.pid).children(recursive=True)]
-        command.kill()
-    assert programs and all(map(is_gone, programs))
-    os.close(pipe)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
