@@ -11,15 +11,21 @@ from mbref.cli import main as mbref
 from tests.helpers.still_engines import resting
 
 NO_COUNTS = ("99999999999999999999", "9" * 5000, "-1", "0.5", "many")
+PROGRAMS = {"crosscheck": main, "mbref": mbref}
+SAMPLES = "from 2 to 1000000"
+VARIED = ("mbref", "ensemble", "four_bar", "--vary", "gravity[1]=0:1")
 COUNTS = {
-    ("run", "four_bar", "--samples"): "from 2 to 1000000",
-    ("compare", "four_bar", "--samples"): "from 2 to 1000000",
-    ("compare", "four_bar", "--repeats"): "from 5 to 1000",
-    ("certify", "four_bar", "--samples"): "from 2 to 1000000",
-    ("reference", "four_bar", "--out", "new.csv", "--samples"): "from 2 to 1000000",
-    ("verify", "mbref", "--mechanisms"): "from 1 to 100000",
-    ("verify", "mbref", "--first-seed"): "from 0 to 1000000000000",
-    ("modes", "four_bar", "--starts"): "from 1 to 10000",
+    **{("crosscheck", c, "four_bar", "--samples"): SAMPLES for c in ("run", "compare", "certify")},
+    ("crosscheck", "compare", "four_bar", "--repeats"): "from 5 to 1000",
+    ("crosscheck", "reference", "four_bar", "--out", "new.csv", "--samples"): SAMPLES,
+    ("crosscheck", "verify", "mbref", "--mechanisms"): "from 1 to 100000",
+    ("crosscheck", "verify", "mbref", "--first-seed"): "from 0 to 1000000000000",
+    ("crosscheck", "modes", "four_bar", "--starts"): "from 1 to 10000",
+    **{("mbref", c, "four_bar", "--samples"): SAMPLES for c in ("run", "plot", "animate")},
+    **{("mbref", c, "four_bar", "--starts"): "from 1 to 10000" for c in ("equilibrium", "modes")},
+    (*VARIED, "--count"): "from 1 to 1000000",
+    (*VARIED, "--workers"): "from 1 to 1000",
+    (*VARIED, "--seed"): "from 0 to 1000000000000",
 }
 NO_TIMES = ["99999999999999999999", "1.1e9", "inf", "nan", "-1"]
 NO_ERRORS = ["1e20", "1.1", "inf", "nan", "-1e-3"]
@@ -39,10 +45,10 @@ RANGES = {  # command line up to an option: its numbers allowed, and some beyond
 }
 
 
-def ended(capsys: pytest.CaptureFixture[str], *command: str) -> tuple[object, str]:
+def ended(capsys: pytest.CaptureFixture[str], *command: str, program: str = "crosscheck"):
     """Return the exit status of a command line, and its standard error."""
     try:
-        status: object = main(command)
+        status: object = PROGRAMS[program](command)
     except SystemExit as end:
         status = end.code
     return status, capsys.readouterr().err
@@ -53,7 +59,8 @@ def ended(capsys: pytest.CaptureFixture[str], *command: str) -> tuple[object, st
 def test_count_outside_its_range_is_refused_with_the_range(command: tuple[str, ...], text: str, capsys):
     """COUNTS has the range of each option; NO_COUNTS are too large, negative, a fraction and a word. The last
     line of the error is a screen's width or two long, with 40 of 5000 digits."""
-    status, said = ended(capsys, *command, text)
+    program, *words = command
+    status, said = ended(capsys, *words, text, program=program)
     assert status == 2
     assert f"{command[-1]}: must be a whole number {COUNTS[command]}, got {text[:40]}" in said
     assert len(said.splitlines()[-1]) < 200

@@ -53,23 +53,6 @@ def test_chain_of_too_many_loops_is_refused_and_not_written(
     assert not [*tmp_path.iterdir()]
 
 
-@pytest.mark.parametrize(
-    ("command", "option"),
-    [
-        *[(command, "--samples") for command in ("run", "plot", "animate")],
-        *[(command, "--starts") for command in ("equilibrium", "modes")],
-        *[("ensemble", option) for option in ("--count", "--workers", "--seed")],
-    ],
-)
-@pytest.mark.parametrize("number", [HUGE, "9" * 5000, "-1", "1.5"])
-def test_count_that_is_huge_negative_or_broken_is_refused_with_its_limits(command, option, number, capsys):
-    """Options that count take whole numbers in a range, which the error states."""
-    with pytest.raises(SystemExit) as ended:
-        main([command, "four_bar", *["--vary", "gravity[1]=0:1"] * (command == "ensemble"), option, number])
-    assert ended.value.code == 2
-    assert f"argument {option}: must be a whole number from " in capsys.readouterr().err
-
-
 STATES = 10_000_000  # largest number of samples times bodies of runs, which take about 2 GB
 
 

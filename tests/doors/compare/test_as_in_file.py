@@ -123,16 +123,11 @@ def test_stiff_closures_and_small_steps_together_reach_the_motion_of_exact_joint
     assert off[STIFFER_RK4] < off[STIFFER] < off[FINER] < off[AS_IN_FILE], off
 
 
-def test_families_of_the_files_model_are_offered_before_those_of_the_scene(tmp_path):
-    """MuJoCo runs the file's own model, and the scene in families such as `tuned`."""
-    families = list(dict.fromkeys(s.family for s in offer("mujoco", imported(tmp_path, FOUR_BAR, TILTED))))
-    assert families[: len(FAMILIES)] == list(FAMILIES) and "tuned" in families[len(FAMILIES) :]
-
-
-def test_families_of_a_file_are_offered_for_mujoco_and_scenes_from_files_alone(tmp_path):
-    """Exudyn reads no MJCF, and the built-in four-bar is from no file."""
+def test_families_of_a_file_are_offered_first_and_for_mujoco_and_scenes_from_files_alone(tmp_path):
+    """Before families such as `tuned`. Exudyn reads no MJCF, and the built-in four-bar is from no file."""
     scene = imported(tmp_path, FOUR_BAR, TILTED)
-    assert of_file("mujoco", scene)
+    families = list(dict.fromkeys(setting.family for setting in offer("mujoco", scene)))
+    assert families[: len(FAMILIES)] == list(FAMILIES) and "tuned" in families[len(FAMILIES) :]
     assert not of_file("exudyn", scene) and not of_file("mujoco", SCENES["four_bar"]())
 
 
