@@ -195,7 +195,8 @@ def test_incomplete_sweep_is_shown_as_far_as_it_got(records):
 
 def test_table_of_cranks_shows_that_an_exact_record_never_leaves_the_true_motion(records):
     """Records move exactly: the table has "–" for the time from which on a run is off the true motion, and
-    rates equal to the true ones. The crank of equal lengths has passed 61 singular positions up to 61 π."""
+    rates equal to the true ones. With a = b the crank angles π/2 + k π are singular; the 61 with k = 0
+    to 60 are within the 61.0 π that the crank turns in 20 s."""
     [found] = [b for b in paper_cranks.render(records) if isinstance(b, Table)]
     [off] = [name for name in found.header if name.startswith("Off by")]
     assert {row[off] for row in cells(found)} == {"–"}

@@ -62,6 +62,7 @@ def test_motion_is_saved_as_json_only(saved, tmp_path):
         ([], "needs at least one sample time"),
         ([[0.0, 0.1]], "needs at least one sample time"),
         ([0.1, 0.1], "must be finite, not negative and increasing"),
+        ([0.2, 0.1], "must be finite, not negative and increasing"),
         ([-0.1, 0.1], "must be finite, not negative and increasing"),
         ([0.0, float("nan")], "must be finite, not negative and increasing"),
         (["soon"], "must be numbers"),
@@ -70,6 +71,7 @@ def test_motion_is_saved_as_json_only(saved, tmp_path):
     ],
 )
 def test_times_of_simulate_that_are_no_samples_are_refused(times, says):
-    """Refused are no time, lists of lists, falling, negative and missing times, texts, and a huge number."""
+    """Refused are no time, lists of lists, equal, falling, negative and undefined times (NaN), texts, and a
+    number that no float can hold."""
     with pytest.raises(InputError, match=f"^times: {says}$"):
         mbref.simulate("four_bar", times=times)

@@ -239,7 +239,8 @@ def test_command_writes_the_scene_and_says_that_points_are_not_reached(tmp_path,
 
 
 def test_command_takes_a_number_of_a_body_whose_name_has_blanks(tmp_path, capsys):
-    """Names of bodies may have blanks, and two bounds follow the path."""
+    """``--let`` has the path of a number and its least and largest value; the name in the path has a blank.
+    At 0 s the arm is as in the scene, so that the point of the file asks for x = 1 m instead of 0.9 m."""
     scene = arm().to_dict()
     scene["body"][0]["name"] = scene["joint"][0]["bodies"][1] = "first arm"
     Scene(**scene).save(tmp_path / "arm.toml")

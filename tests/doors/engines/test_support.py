@@ -68,8 +68,8 @@ def test_every_feature_that_an_engine_does_not_refuse_starts_by_gauss_s_principl
 
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn", "dart"])
 def test_engines_that_map_massless_links_move_them_as_a_universal_joint(name):
-    """Two hinges on a link without mass are a universal joint. The engine's best setting moves the body
-    within 1e-6 m of the judge's reference with such a joint."""
+    """Two hinges on a link without mass are a universal joint. The engine's best setting moves the body, by
+    up to 0.1 m, within 1e-6 m of the judge's reference with such a joint; measured are 2e-13 m."""
     pytest.importorskip({"dart": "dartpy"}.get(name, name))
     scene, simulator = massless_link(), engine(name)
     joint = Universal(name="U", bodies=("ground", "body"), anchor=PIVOT, axes=PLACES["axes"])

@@ -50,8 +50,9 @@ def refused(capsys: pytest.CaptureFixture[str], place: Path) -> str:
 
 
 @pytest.mark.parametrize("content", FOREIGN, ids=lambda content: ascii(content[:8]))
-def test_records_file_of_other_content_is_named(content, tmp_path, capsys):
-    """Null, nested, empty or foreign JSON, no UTF-8, an escape character, by both commands of ``refused``."""
+def test_file_without_any_record_is_refused_in_one_sentence_with_its_name(content, tmp_path, capsys):
+    """FOREIGN are null, deeply nested, empty and foreign JSON, bytes that are no UTF-8, and an escape
+    character. ``refused`` gives each file to two commands."""
     assert "holds no records" in refused(capsys, folder(tmp_path / "r", content))
 
 

@@ -44,7 +44,8 @@ CONNECT = '<connect name="C" site1="tip" site2="toe"/>'
 
 def test_an_open_connect_of_sites_is_closed_with_the_lengths_of_the_file(tmp_path):
     """By the file, the sites of C are 0.6 m from hinge B and 0.5 m from hinge D, and B is 0.25 m from A, at
-    (0, 0, 1) m. A note states by how much the loop was open. The scene moves as MuJoCo's model."""
+    (0, 0, 1) m. A note states the gap at the file's zero angles, √(0.15² + 0.5²) = 0.522 m, to one
+    digit. The scene moves as MuJoCo's model."""
     found = read(tmp_path, OPEN_LOOP.replace("EQUALITY", CONNECT))
     scene = found.imported.scene
     at = np.array(scene.joint_named("C").anchor)
@@ -162,13 +163,14 @@ def test_note_names_frames_of_two_branches_that_coincide(tmp_path):
 
 
 def test_close_reads_pairs_of_frames_from_a_yaml_file(tmp_path):
-    """The scene's joints are those with the pair end_a=end_b of the command line."""
+    """The pair end_a and end_b, of type 3d, closes the chain of three hinges by a ball joint, whether the
+    option `close` has it as text or names a file with it."""
     (tmp_path / "loops.yaml").write_text("closed_loop: [[end_a, end_b]]\ntype: [3d]\n")
     closed = [
         read(tmp_path, open_chain(), "closed.urdf", close=[pairs]).imported.scene.joint
         for pairs in (str(tmp_path / "loops.yaml"), "end_a=end_b")
     ]
-    assert closed[0] == closed[1]
+    assert closed[0] == closed[1] and [j.type for j in closed[0]] == ["revolute"] * 3 + ["spherical"]
 
 
 @pytest.mark.parametrize(

@@ -133,9 +133,10 @@ def test_crossings_are_none_without_detection_and_empty_if_no_position_is_passed
 
 
 def test_open_reactions_count_redundant_rows_and_one_more_at_a_singular_position():
-    """The driven rhombus has one redundant row, in which all four joints take part: one open component each.
-    At its flat position, the second sample, one more row depends on the others, so that forces may have no
-    finite reactions there, and the torque of the driver counts as open; 10 µs later neither is so."""
+    """A component of a reaction is open if equilibrium does not determine it. The driven rhombus has 19 rows
+    of rank 18: one redundant row, in which all four joints take part, opens one component each. At its flat
+    position, the second sample, one more row depends on the others and opens one more, also the driver's
+    torque; 10 µs later it does not."""
     flat = simulate(four_bar(), "taylor", [0.05]).crossings[0].time
     run = simulate(four_bar(), "taylor", [0.001, flat, flat + 1e-5])
     found = {part: tuple(row) for part, row in run.open_reactions.items()}
