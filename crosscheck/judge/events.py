@@ -64,7 +64,7 @@ def _after(scene: Scene, piece: Scene, event: Event) -> Scene:
 def _jump(scene: Scene, after: Scene, event: Event) -> Impact:
     """Return the judge's impact at an event, with the end stops that the run met."""
     before, bare = _before(event), after.with_(driver=after.driver[: len(scene.driver)])
-    touching = [end for end in ends_of(scene) if end.name in (*event.stops, *event.contacts)]
+    touching = [end for end in ends_of(scene) if end.name in (*event.stops, *event.contacts, *event.released)]
     wanted = hits(bare, [end for end in touching if end.name in event.stops], before, ())
     wanted |= {end: 0.0 for end in wanted if end.name in event.chatter}
     return bounced(bare, before, touching, wanted)

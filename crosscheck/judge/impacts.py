@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import null_space
+from scipy.optimize import nnls
 
 from crosscheck.judge.constraints import jacobian
 from crosscheck.judge.joint_coordinates import Reflected, reflected
@@ -49,6 +50,25 @@ def impact(after: Scene, state: State) -> Impact:
     found = state._replace(velocity=twists[:, :3].copy(), angular_velocity=twists[:, 3:].copy())
     impulses = _impulses(after, rows, state, mass, geared, change)
     return Impact(without_rounding(after, found, state), impulses, float(change @ mass @ change) / 2)
+
+
+def pushing(after: Scene, state: State, gaps: np.ndarray, least: np.ndarray) -> np.ndarray:
+    """Return which gaps (e,), with rows (e, 6 nb) in the twists, have impulses where an impact leaves rates
+    of at least ``least`` (e,): the change of twists is then the least one, and no impulse pulls."""
+    rows, _ = jacobian(after, 0.0, state.position, state.orientation)
+    mass, _ = _mass_matrix(after, state)
+    scaled, units, _ = unit_rows(after, rows)
+    free = units[:, None] * (null_space(scaled, rcond=RANK) if len(rows) else np.eye(len(units)))
+    inner, turned = np.linalg.eigh(free.T @ mass @ free)
+    kept = inner > RANK * inner.max(initial=0.0)  # others are velocities of bodies without mass
+    pushes = (free @ turned[:, kept] / np.sqrt(inner[kept])).T @ gaps.T  # (f, e), by unit impulses
+    sizes = np.maximum(np.linalg.norm(pushes, axis=0), np.finfo(float).tiny)
+    after_joints = impact(after, state).state
+    twists = np.hstack([after_joints.velocity, after_joints.angular_velocity]).ravel()
+    lacking = (least - gaps @ twists) / sizes
+    return np.asarray(
+        nnls(pushes / sizes, np.linalg.lstsq((pushes / sizes).T, lacking, rcond=RANK)[0])[0] > 0
+    )
 
 
 def _mass_matrix(scene: Scene, state: State) -> tuple[np.ndarray, Reflected]:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck.judge.constraints import jacobian, joint_rates, scene_length
-from crosscheck.judge.impacts import Impact, impact
+from crosscheck.judge.impacts import Impact, impact, pushing
 from crosscheck.judge.joint_coordinates import COORDINATES, coordinate_accelerations, coordinate_jacobian
 from crosscheck.judge.joint_residuals import grounded, joint_frames, with_ground
 from crosscheck.judge.pieces import State
@@ -79,16 +79,14 @@ def second_rates(
 
 
 def bounced(after: Scene, before: State, touching: Sequence[End], wanted: Mapping[End, float]) -> Impact:
-    """Return the impact after which gaps have the wanted rates; other gaps that would close stay closed."""
-    rates = dict(wanted)
-    while True:
-        driven = {end.joint: -end.sign * rate for end, rate in rates.items()}
-        found = impact(_driven(after, driven), before)
-        left = [end for end in touching if end not in rates]
-        closing = rates_of(after, left, found.state) < -still(after, before)
-        if not closing.any():
-            return found
-        rates |= {end: 0.0 for end, closes in zip(left, closing, strict=True) if closes}
+    """Return the impact of least change after which gaps have at least the wanted rates, other gaps zero."""
+    if not touching:
+        return impact(after, before)
+    least = np.array([wanted.get(end, 0.0) for end in touching])
+    pose = before.position, before.orientation
+    gaps = [-end.sign * coordinate_jacobian(after, end.joint, *pose)[end.column] for end in touching]
+    chosen = np.flatnonzero(pushing(after, before, np.array(gaps), least))
+    return impact(_driven(after, {touching[k].joint: -touching[k].sign * least[k] for k in chosen}), before)
 
 
 def is_locked(piece: Scene, joint: str, state: State, column: int) -> bool:

@@ -28,7 +28,8 @@ class Impact(NamedTuple):
 
     ``velocity`` and ``angular_velocity`` (nb, 3) after it, world axes; ``impulses`` (6,) by joint, N s and
     N m s, on its second body at its anchor; ``open`` counts by joint the components that the equations leave
-    open; ``energy`` is the kinetic energy before and after the impact, J, with rotors of armatures.
+    open; ``energy`` is the kinetic energy before and after the impact, J, with rotors of armatures;
+    ``of_drivers`` (d,) are the impulses along the coordinates of the drivers of joints, N s or N m s.
     """
 
     velocity: np.ndarray
@@ -36,6 +37,7 @@ class Impact(NamedTuple):
     impulses: dict[str, np.ndarray]
     open: dict[str, int]
     energy: tuple[float, float]
+    of_drivers: np.ndarray
 
 
 def impact(before: Scene, after: Scene) -> Impact:
@@ -55,6 +57,7 @@ def impact(before: Scene, after: Scene) -> Impact:
     redundant = vanishing_at(model, 0.0, q)
     wrenches = least_reactions(model, poses, blocks, multipliers[None], always=redundant)
     marks = open_dimensions(model, blocks, redundant)
+    rows = [model.structure.row[model.structure.driver == d][0] for d in range(len(after.driver))]
     model.release()
     return Impact(
         motion["velocity"][0],
@@ -62,6 +65,7 @@ def impact(before: Scene, after: Scene) -> Impact:
         {name: wrench[0] for name, wrench in wrenches.items()},
         {name: int(marks[name][0]) for name in wrenches},
         energy,
+        -multipliers[np.array(rows, dtype=int)],
     )
 
 

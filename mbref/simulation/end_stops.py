@@ -127,7 +127,8 @@ class EndStops:
         bouncing = [side for side in hits if wanted[side] > still]
         if bouncing:
             flying = self._in_lasting(after, found, self._resting(touching, state, found, still))
-            chatter = [s for s in bouncing if self._flight(flying, s, wanted[s]) < CHATTER * self._end]
+            rates = {side: self._rate(side, state, found) for side in bouncing}
+            chatter = [s for s in bouncing if self._flight(flying, s, rates[s]) < CHATTER * self._end]
         if chatter:
             wanted |= dict.fromkeys(chatter, 0.0)
             found = self._impact(before, after, state, touching, wanted, still)
@@ -145,15 +146,35 @@ class EndStops:
         wanted: Mapping[Side, float],
         still: float,
     ) -> Impact:
-        """Return the impact with given rates of gaps after it; other gaps that would close stay closed."""
-        rates = dict(wanted)
+        """Return the impact of least change after which gaps have at least given rates, other gaps zero.
+
+        Stops whose impulses would pull take none; their coordinates leave faster. The first stop against this
+        changes, which ends for independent stops (Murty, Opsearch 11, 1974).
+        """
+        least = dict.fromkeys(touching, 0.0) | dict(wanted)
+        acting, tried = {*wanted}, set[frozenset[Side]]()
         while True:
-            driven = [Driver(joint=s.joint, polynomial=(0.0, -s.sign * rate)) for s, rate in rates.items()]
+            held = [side for side in least if side in acting]
+            driven = [Driver(joint=s.joint, polynomial=(0.0, -s.sign * least[s])) for s in held]
             found = impact(before, after.with_(driver=[*after.driver, *driven]))
-            closing = [s for s in touching if s not in rates and self._rate(s, state, found) < -still]
-            if not closing:
+            pulling = self._pulling(held, found)
+            wrong = (
+                s
+                for s in least
+                if (s in pulling if s in acting else self._rate(s, state, found) < least[s] - still)
+            )
+            tried.add(frozenset(acting))
+            if (first := next(wrong, None)) is None or acting ^ {first} in tried:
                 return found
-            rates |= dict.fromkeys(closing, 0.0)
+            acting ^= {first}
+
+    def _pulling(self, held: Sequence[Side], found: Impact) -> list[Side]:
+        """Return the sides, whose drivers are the last ones of an impact, with impulses that pull."""
+        lengths = np.array([self.length if side.coordinate == DISPLACEMENT else 1.0 for side in held])
+        signs = np.array([side.sign for side in held])
+        pushes = -signs * lengths * found.of_drivers[len(found.of_drivers) - len(held) :]
+        least = PULL * np.abs(pushes).max(initial=0.0)
+        return [side for side, push in zip(held, pushes, strict=True) if push < -least]
 
     def _rate(self, side: Side, state: Trajectory, found: Impact) -> float:
         moved = replace(state, velocity=found.velocity[None], angular_velocity=found.angular_velocity[None])

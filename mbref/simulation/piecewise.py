@@ -98,7 +98,7 @@ class _Watch:
     """The stops and conditions of a scene, whose signals are followed together."""
 
     def __init__(self, scene: Scene, run: Callable[[Scene, np.ndarray], Motion], times: np.ndarray):
-        self._run, self._times, end = run, times, float(times[-1])
+        self._run, self._times, end = run, times, float(times[-1]) or scene.duration
         self.stops = EndStops(scene, run, end)
         self.conditions = Conditions(scene, run, end, self.stops.length)
         every = constraint_parts(scene)

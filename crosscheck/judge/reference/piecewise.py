@@ -46,7 +46,7 @@ def motion_by(
         left += time.thread_time() - began
         return found
 
-    bounces = Bounces(scene, run, float(wanted[-1]))
+    bounces = Bounces(scene, run, float(wanted[-1]) or scene.duration)
     piece, begin, moved, parts = at_start(scene), 0.0, _unmoved(scene), list[Motion]()
     contacts: tuple[str, ...] = ()
     if bounces.ends:

@@ -285,3 +285,21 @@ def test_rod_that_starts_at_the_end_of_its_range_leaves_it_without_an_event():
     (event,) = mbref.simulate(door().with_(joint=[joint]), "taylor", times=[0.0, 0.5]).events
     speed = np.sqrt(2 * 2.0 * G * 0.5 * np.sin(1.0) / 0.7)
     assert event.stops == ("A.lower",) and abs(event.angular_velocity_after[0, 2] - speed / 2) <= SOLVED
+
+
+def test_stop_that_is_met_with_another_one_does_not_pull():
+    """Two rods of 1 m, 1 kg and 0.1 kg m² in a line turn at 1 and 0.9 rad/s; both hinges meet ends without
+    restitution. A stops, and b leaves its end, with its momentum about B: 0.35 ω = 0.1 · 0.9 + 0.5 · 1.45."""
+    spins, speeds = ((0.0, 0.0, 1.0), (0.0, 0.0, 0.9)), ((0.0, 0.5, 0.0), (0.0, 1.45, 0.0))
+    bodies = [
+        body(name, 1.0, [0.1] * 3, (k + 0.5, 0.0, 0.0), velocity=speeds[k], angular_velocity=spins[k])
+        for k, name in enumerate("ab")
+    ]
+    hinges = [hinge("A", "ground", "a", ORIGIN, Z, stop={"upper": 0.0})]
+    hinges += [hinge("B", "a", "b", X, Z, stop={"lower": 0.0})]
+    scene = Scene(name="rods", duration=0.1, body=bodies, joint=hinges)
+    motion = mbref.simulate(scene, "taylor", times=[0.0])
+    (event,) = motion.events
+    assert event.stops == ("A.upper", "B.lower") and event.contacts == ("A.upper",)
+    assert np.abs(event.angular_velocity_after[:, 2] - [0.0, 0.815 / 0.35]).max() <= SOLVED
+    assert measure(scene, motion, None)["impact_error"] <= ROUNDED
