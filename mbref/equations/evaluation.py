@@ -43,15 +43,17 @@ def set_velocities(v, frames):
 
 @kernel
 def rate_of_row(row, v, equations):
-    """Return Φ' = Φ_q v - ν of one row."""
+    """Return Φ' = Φ_q v - ν of one row, and the sum of the sizes of its terms."""
     bodies, blocks = equations.scene.row_bodies, equations.system.blocks
     value = -equations.rows.nu[row]
+    size = abs(value)
     for side in range(bodies.shape[1]):
         start = 6 * bodies[row, side]
         if start < v.shape[0]:
             for k in range(6):
                 value += blocks[row, 6 * side + k] * v[start + k]
-    return value
+                size += abs(blocks[row, 6 * side + k] * v[start + k])
+    return value, size
 
 
 @inlined

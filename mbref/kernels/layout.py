@@ -174,6 +174,9 @@ class Control(NamedTuple):
     largest_step: float  # s
     largest_turn: float  # rad that a body may turn in a step
     violation: float  # largest |Φ| (m or rad)
+    rate: float  # largest |Φ'| / sum of the sizes of its terms, in scenes with rolling wheels
+    rate_share: float  # of the largest such sum: a smaller sum counts as much
+    rest: float  # m/s and rad/s; smaller |Φ'| are rounding
     most_steps: float
     steps_per_call: float
     forced_step: float  # s; a step this short is taken whatever its error estimate

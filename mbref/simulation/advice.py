@@ -56,7 +56,8 @@ def remedy(run: Run, status: int) -> str:
     if status == UNDECIDED:
         return _of_branch(run)
     if status == VIOLATED:
-        return "" if run.method.stabilisation.projects else CORRECTS
+        rolls, by = run.model.structure.velocity_rows.size > 0, run.method.stabilisation
+        return "" if by.projects or (rolls and by.chooses_coordinates) else CORRECTS
     return _follows(run) if status == LEFT_MOTION else ""
 
 

@@ -253,6 +253,9 @@ def _cause(run: Run, status: int) -> str:
         if row in run.model.structure.velocity_rows:
             return f"the wheel of joint {run.model.row_joint[row]!r} has to slip at t = {t:.6g} s"
         size = abs(memory.equations.rows.phi[row])
+        if not size > memory.control.violation:
+            joint = run.model.row_joint[row]
+            return f"the rate of joint {joint!r} contradicts a wheel that does not slip, at t = {t:.6g} s"
         return (
             f"joint {run.model.row_joint[row]!r} is violated by {size:.3g}, more than "
             f"{memory.control.violation:.3g}, at t = {t:.6g} s"

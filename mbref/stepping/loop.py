@@ -59,16 +59,21 @@ def check_state(y, y_rate, memory):
     memory.loop.clock.violated_row = row
     if row >= 0 and abs(phi[row]) > memory.control.violation:
         return VIOLATED
-    return check_slip(memory)
+    return OK if memory.equations.scene.velocity_rows.shape[0] == 0 else check_rates(memory)
 
 
 @kernel
-def check_slip(memory):
-    """Return VIOLATED if a wheel slips so fast that it would slip, in the time of the run, by more than a
-    position may violate its rows; otherwise OK."""
-    equations, span = memory.equations, memory.loop.times[-1]
-    for row in equations.scene.velocity_rows:
-        if abs(rate_of_row(row, memory.state.velocities, equations)) * span > memory.control.violation:
+def check_rates(memory):
+    """Return VIOLATED if Φ' of a row is larger than rounding or drift, otherwise OK; rows between velocities,
+    of wheels that roll, are first."""
+    equations, v, control = memory.equations, memory.state.velocities, memory.control
+    velocity_rows, m, greatest = equations.scene.velocity_rows, equations.rows.phi.shape[0], 0.0
+    for row in range(m):
+        greatest = max(greatest, rate_of_row(row, v, equations)[1])
+    for k in range(velocity_rows.shape[0] + m):
+        row = velocity_rows[k] if k < velocity_rows.shape[0] else k - velocity_rows.shape[0]
+        value, size = rate_of_row(row, v, equations)
+        if abs(value) > max(control.rest, control.rate * max(size, control.rate_share * greatest)):
             memory.loop.clock.violated_row = row
             return VIOLATED
     return OK
