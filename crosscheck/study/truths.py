@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.judge.metrics import at_samples, error_series
 from crosscheck.judge.model_identity import gate_times
 from crosscheck.judge.reference.cache import mechanism
 from crosscheck.judge.reference.reference import NoReference, reference
@@ -35,7 +36,8 @@ def truth_record(scene: Scene, times: np.ndarray, reference_time: float, dead: f
     """Return the record of a scene's true motion at times (k,), and at the times of animation frames.
 
     ``kind`` is the family of the closed form, "reference", or "" if there is no truth. ``bound`` limits the
-    error. ``until`` (s) is the time up to which the motion is known, with the ``reason`` for its end.
+    error. ``until`` (s) is the time up to which the motion is known, with the ``reason`` for its end, and
+    ``moved`` the largest way of a body from its start until then, of the length, or rad.
     ``dead`` (s) is the time of a dead position of the drivers, before which the comparison ends.
     """
     wanted = evaluated(scene, times)
@@ -84,6 +86,7 @@ def _of_family(scene: Scene, family: Truth, times: np.ndarray) -> dict[str, Any]
         "bound": family.accuracy,
         "reason": reason,
         "until": float(times[-1]),
+        "moved": moved(scene, exact),
         "both": True,
         "motion": _motion(exact),
     }
@@ -96,6 +99,7 @@ def _of_reference(scene: Scene, times: np.ndarray, reference_time: float) -> dic
     part = found.part if isinstance(found, NoReference) else found
     if not part.times.max(initial=0.0) > 0:
         return _nothing(getattr(found, "reason", ""))
+    exact = trajectory(scene, part)
     return {
         "kind": "reference",
         "bound": float(part.bound.max()),
@@ -103,8 +107,15 @@ def _of_reference(scene: Scene, times: np.ndarray, reference_time: float) -> dic
         "reason": getattr(found, "reason", ""),
         "until": float(part.times.max()),
         "seconds": part.seconds,
-        "motion": _motion(trajectory(scene, part)),
+        "moved": moved(scene, exact),
+        "motion": _motion(exact),
     }
+
+
+def moved(scene: Scene, exact: Trajectory) -> float:
+    """Return the largest way of a body from its start: of the mechanism's length, or rad up to π."""
+    still = at_samples(exact, np.zeros(len(exact.times), dtype=int))
+    return float(error_series(scene, exact, still).max(initial=0.0))
 
 
 def _nothing(reason: str) -> dict[str, Any]:

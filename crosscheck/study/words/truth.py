@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from crosscheck.judge.tolerances import FLOOR
 from crosscheck.study.grades import Judged
 from crosscheck.study.words.text import listed
 from mbref.scene import Scene
@@ -77,6 +78,18 @@ def up_to(groups: Sequence[Judged]) -> str:
         at = f"t = {dead[0].truth['dead']:.4g} s"
         return f"Up to t = {dead[0].scene.duration:.4g} s, before the dead position of the drivers at {at}"
     return ""
+
+
+def stands_still(groups: Sequence[Judged]) -> list[str]:
+    """Return a sentence on the scenes whose bodies stay where they are, within the errors of right runs."""
+    still = [g for g in groups if "moved" in g.truth and g.truth["moved"] <= max(FLOOR, g.truth["bound"])]
+    if not still:
+        return []
+    most = max(FLOOR, *(g.truth["bound"] for g in still))
+    return [
+        f"No body of {names(still)} moves by more than {most:.0e} of the length, or rad, so that an engine "
+        "that moves nothing is right as well."
+    ]
 
 
 def names(groups: Sequence[Judged]) -> str:

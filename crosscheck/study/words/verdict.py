@@ -20,7 +20,7 @@ from crosscheck.study.words.text import (
     listed,
     uncapitalised,
 )
-from crosscheck.study.words.truth import names, truth, up_to
+from crosscheck.study.words.truth import names, stands_still, truth, up_to
 
 TIMED_OUT = "TIMED_OUT"
 
@@ -49,7 +49,7 @@ def verdict(groups: Sequence[Judged], difference: str | None = None) -> Verdict:
     """
     times = f"Times are not compared, the engines simulate different mechanisms: {difference}."
     return Verdict(
-        headline=" ".join([headline(groups), *free_falls(groups)]),
+        headline=" ".join([headline(groups), *stands_still(groups), *free_falls(groups)]),
         right=right(groups),
         fast=times if difference else fast(groups),
         breaks=breaks(groups),

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from rich.console import Console
 
@@ -15,6 +16,7 @@ from crosscheck.cli import differences, tables
 from crosscheck.cli.terminal_plot import scatter
 from crosscheck.study.difference import load
 from crosscheck.study.grades import Grade, Judged, grade, judged
+from crosscheck.study.truths import truth_record
 from crosscheck.study.words.speed import fast
 from crosscheck.study.words.truth import truth
 from crosscheck.study.words.verdict import breaks, headline, right, verdict
@@ -22,6 +24,7 @@ from mbref.motions.trajectory import Cost
 from mbref.records import append
 from mbref.scenes import SCENES
 from reports.runs import Run
+from tests.helpers.falling_engine import STONE
 from tests.reports import synthetic
 
 REDUNDANT, SOUND = SCENES["planar_slider_crank"](), SCENES["spatial_slider_crank"]()
@@ -69,6 +72,19 @@ def test_grade_follows_from_the_error_of_a_completed_run(error, expected):
     """Right up to 1e-8 of the length, wrong above 1e-2; unjudged without an error, failed if incomplete."""
     assert grade(record("a", "b", error)) is expected
     assert grade(record("a", "b", error, outcome="TIMED_OUT")) is Grade.FAILED
+
+
+@pytest.mark.parametrize(
+    ("drop", "bound", "is_said"), [(0.0, 0.0, True), (1e-7, 0.0, False), (1e-7, 1e-6, True)]
+)
+def test_verdict_says_where_standing_still_is_right(drop, bound, is_said):
+    """A stone falls freely by h = g t² / 2 of its length, 1 m, less or more than the grades tell."""
+    stone = STONE.with_(gravity=(0.0, 0.0, -2.0 * drop), duration=1.0)
+    known = truth_record(stone, np.array([0.0, 1.0]), 0.0)
+    own = Judged(
+        stone, known | {"bound": max(bound, known["bound"])}, [record("a", "b", 0.0, scene=stone.name)]
+    )
+    assert ("moves nothing" in verdict([own]).headline) is is_said
 
 
 @pytest.mark.parametrize(
