@@ -163,7 +163,7 @@ def _between_ends(package: str, known: Sequence[str], first: str, last: str) -> 
 def _found(task: _Task, old: Measured, new: Measured) -> list[Found]:
     """Return the changes; raises RequestError if no command ends with a result in either version."""
     if all(document is None for measured in (old, new) for document in measured.documents):
-        raise RequestError(*dict.fromkeys([*old.faults, *new.faults]))
+        raise RequestError(*dict.fromkeys([*old.faults.values(), *new.faults.values()]))
     return between(old, new, task.scenes)
 
 
@@ -171,7 +171,7 @@ def _of_pair(old: Measured, new: Measured, found: Sequence[Found]) -> dict[str, 
     sides = {"old": old, "new": new}
     return {
         **{
-            side: {"requirement": str(one.requirement), **one.facts, "faults": list(one.faults)}
+            side: {"requirement": str(one.requirement), **one.facts, "faults": list(one.faults.values())}
             for side, one in sides.items()
         },
         "changes": [one._asdict() for one in found],

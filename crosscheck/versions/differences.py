@@ -44,13 +44,23 @@ class Found(NamedTuple):
 
 def between(old: Measured, new: Measured, scenes: Sequence[Scene]) -> list[Found]:
     """Return the changes from one version to another: results, and among them other verdicts, first."""
-    found = [Found("run", "", f"only {new.requirement}: {text}") for text in new.faults if not old.faults]
-    found += [Found("run", "", f"only {old.requirement}: {text}") for text in old.faults if not new.faults]
+    found = list(_of_faults(old, new))
     for before, after in zip(old.documents, new.documents, strict=True):
         if before is not None and after is not None:
             found += _of_documents(before, after, {scene.name: scene for scene in scenes})
     found += _of_facts(old.facts, new.facts)
     return sorted(found, key=lambda one: (not one.is_result, one.change.startswith(SAME_VERDICT)))
+
+
+def _of_faults(old: Measured, new: Measured) -> Iterator[Found]:
+    """Yield the commands that end without a result in one version, and in both, where nothing is compared."""
+    for command in dict.fromkeys([*old.faults, *new.faults]):
+        before, after = old.faults.get(command), new.faults.get(command)
+        if before and after:
+            yield Found("not compared", "", f"both: {after}")
+        else:
+            only = old.requirement if before else new.requirement
+            yield Found("run", "", f"only {only}: {before or after}")
 
 
 def _of_documents(before: Any, after: Any, scenes: Mapping[str, Scene]) -> Iterator[Found]:

@@ -23,13 +23,13 @@ class Measured(NamedTuple):
     """Documents of the commands in one version's environment, in their order; None for a command that ended
     without a document.
 
-    ``facts`` are of `library.facts`, and ``faults`` one sentence for each command without a document.
+    ``facts`` are of `library.facts`, and ``faults`` have a sentence for each command without a document.
     """
 
     requirement: Requirement
     facts: Mapping[str, Any]
     documents: Sequence[Any]
-    faults: Sequence[str]
+    faults: Mapping[str, str]
 
 
 def measured(wanted: Requirement, engine: str, commands: Sequence[Command], say: Say, done: Say) -> Measured:
@@ -40,12 +40,13 @@ def measured(wanted: Requirement, engine: str, commands: Sequence[Command], say:
     say(f"{wanted}: making its environment")
     python = environment(wanted)
     done(f"{wanted}: environment")
-    found, faults = list[Any](), list[str]()
+    found, faults = list[Any](), dict[str, str]()
     for command in ([LIBRARY, engine], *commands):
         document, said = _document(python, command, lambda line: say(f"{wanted}: {line}"))
         found.append(document)
         if document is None:
-            faults.append(f"`{' '.join(command)}` ends without a result: {said}")
+            words = " ".join(command)
+            faults[words] = f"`{words}` ends without a result: {said}"
         done(f"{wanted}: {' '.join(command[:2])}")
     facts, *documents = found
     return Measured(wanted, facts or {}, documents, faults)

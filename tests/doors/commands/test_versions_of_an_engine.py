@@ -38,7 +38,7 @@ def measured(version: str, factor: float = 1.0, seconds: float = 1.0, card: str 
     verdict = {"scene": "pendulum", "card": "energy/1", "status": card, "measured": 0.1, "reason": ""}
     suite = {"verdicts": [verdict | {"allowed": 1.0}]}
     documents = [{"scene": "stone", "records": [run]}, suite]
-    return Measured(Requirement(PACKAGE, version), {}, documents, [])
+    return Measured(Requirement(PACKAGE, version), {}, documents, {})
 
 
 @pytest.mark.parametrize(
@@ -57,6 +57,19 @@ def test_changes_beyond_noise_are_named_by_kind(changed: dict[str, Any], kinds: 
     large changes accelerations by (1.5 - 1) / 1.5 = 0.33 of the largest, and their error from 0 to 0.5."""
     found = between(measured("1.0"), measured("1.1", **changed), [STONE])
     assert [(one.kind, one.change) for one in found] == kinds
+
+
+def test_commands_without_a_result_are_named_for_each_version_and_for_both():
+    """Both versions end their runs, and the older one its suite, too: neither run nor suite is compared."""
+    said = {"compare": "`compare` ends without a result: no memory"}
+    old = measured("1.0")._replace(documents=[None, None], faults=said | {"verify": "`verify` ends"})
+    new = measured("1.1")
+    new = new._replace(documents=[None, new.documents[1]], faults=said)
+    found = [(one.kind, one.change) for one in between(old, new, [STONE])]
+    assert found == [
+        ("run", f"only {PACKAGE}==1.0: `verify` ends"),
+        ("not compared", f"both: {said['compare']}"),
+    ]
 
 
 def test_bisection_finds_the_change_past_versions_that_cannot_be_installed():
