@@ -80,7 +80,7 @@ def built(tmp_path_factory) -> Path:
 
 @pytest.mark.slow
 def test_a_wheel_has_two_packages_and_every_file_of_data(built):
-    """Every file in mbref and crosscheck, and modules and templates of reports as crosscheck/reports."""
+    """The checkout's files are the truth; modules and templates of reports stand in crosscheck/reports."""
     (wheel,) = built.glob("*.whl")
     files = zipfile.ZipFile(wheel).namelist()
     assert {name.partition("/")[0] for name in files if ".dist-info" not in name} == {"mbref", "crosscheck"}

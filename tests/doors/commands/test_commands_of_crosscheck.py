@@ -341,7 +341,7 @@ def test_tune_says_why_no_run_reaches_the_error(error, bound, outcome):
 
 
 def test_version_lists_crosscheck_and_installed_engines(capsys):
-    """MuJoCo, which these tests need, has a line."""
+    """MuJoCo, which these tests require to be installed, has a line of its own."""
     status, out, _ = run_main(capsys, "--version")
     assert status == 0 and out.startswith("crosscheck ") and "\nmujoco " in out, out
 

@@ -36,8 +36,8 @@ def test_every_finding_has_sentences_and_a_violation_measured_by_one_proof() -> 
 
 @pytest.mark.parametrize("path", RECORDS, ids=lambda path: f"{path.parent.name}/{path.name}")
 def test_no_stored_run_ended_the_process_of_its_engine(path: Path) -> None:
-    """A record has scene and settings, so that whoever repeats it would lose the process. Records of
-    public files, which are left out, have names of files alone."""
+    """A run that ended its process has the message "ended by SIG…"; who repeats it by its record loses the
+    process. Records of public files (PUBLIC), which only name files, are left out."""
     content = lzma.decompress(path.read_bytes()) if path.suffix == ".xz" else b""
     if not content:
         with zipfile.ZipFile(path) as pack:
@@ -78,7 +78,7 @@ def proofs() -> list[object]:
 
 @pytest.mark.parametrize("name", proofs())
 def test_the_proof_of_a_finding_gives_its_stored_number_at_the_stored_version(name: str) -> None:
-    """Within 5 %, or present where rounding decides (NaN). Other versions of the library may be right."""
+    """The stored number is met within 5 %; NaN is stored if rounding decides. Other versions may be right."""
     (found,) = chosen([name])
     answer = found.recheck()
     if answer.version != found.version or found.crashes:

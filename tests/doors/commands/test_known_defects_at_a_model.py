@@ -107,7 +107,7 @@ def test_each_finding_with_conditions_has_a_mechanism_in_these_tests():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 def test_finding_is_named_at_a_mechanism_that_has_it_and_not_at_another_one(name, tmp_path, capsys):
-    """The finding belongs to the installed version if its conditions name that version, or none."""
+    """MODELS has both mechanisms. A finding counts if its conditions name the installed version, or none."""
     asked, when = WITH[name].engine, WITH[name].when
     if not installed(asked):
         pytest.skip(f"{asked} is not installed")

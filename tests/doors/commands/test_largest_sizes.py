@@ -69,9 +69,9 @@ def test_ensemble_of_more_states_than_memory_holds_is_refused_with_the_largest_c
 
 
 def test_full_matrix_beyond_the_memory_of_the_machine_is_refused_with_its_size():
-    """For 10⁹ poses a matrix of 19 rows and 24 columns of 8 bytes takes 3648 GB: 18 columns are of the three
-    bodies, and six of the ground, which are computed and then left out. The blocks that are given are views
-    of one block, which take no memory."""
+    """Two hinges with 5 rows, two universal joints with 4 and a driver have 19 rows. For 10⁹ poses, 19 rows
+    and 24 columns of 8 bytes take 3648 GB: 18 columns of three bodies, and six of the ground, which are left
+    out later. The blocks that are given are views of one block, which take no memory."""
     structure = Model(find_scene("four_bar")).structure
     one = np.zeros(structure.entry_columns.shape)
     with pytest.raises(InputError, match=r"of 19 constraint rows and 18 columns takes 3\.65e\+03 GB"):

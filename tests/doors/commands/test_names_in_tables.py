@@ -10,16 +10,8 @@ from mbref.motions.trajectory import Trajectory
 from mbref.scene import Body, Scene
 
 NAMES = (
-    "[red]x[/]",
-    "[/nothing]",
-    "$x_1$",
-    "../../up",
-    "a/b",
-    "<b>&amp;</b>",
-    "a|b",
-    "Türe α",
-    "%s {0}",
-    "ground ",
+    *("[red]x[/]", "[/nothing]", "$x_1$", "../../up", "a/b"),
+    *("<b>&amp;</b>", "a|b", "Türe α", "%s {0}", "ground "),
 )
 
 

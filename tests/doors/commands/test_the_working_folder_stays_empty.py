@@ -42,8 +42,8 @@ def test_file_that_mujoco_warns_about_leaves_no_log(command, text, status, tmp_p
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", ["four_bar", "four_bar_gravity"])
 def test_runs_and_modes_of_engines_leave_no_file(scene, tmp_path, monkeypatch):
-    """The commands ran, and were not refused (2): Exudyn's defaults end early, with status 1, and `modes`,
-    which asks all engines but mbref, finds equilibria."""
+    """The statuses show that no command was refused (2): Exudyn's defaults end early, which gives 1, and
+    `modes`, which asks all engines but mbref, finds equilibria, which gives 0."""
     monkeypatch.chdir(tmp_path)
     engines = [word for name in ("mbref", "mujoco", "pinocchio", "exudyn") for word in ("--engine", name)]
     assert crosscheck(["run", scene, *engines, "--samples", "3", "--duration", "0.01"]) == 1
