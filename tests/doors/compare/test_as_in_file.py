@@ -98,8 +98,8 @@ def test_run_as_in_file_equals_steps_of_mujoco_on_its_own_model_of_the_file(tmp_
 
 
 def test_velocities_and_accelerations_of_the_files_model_are_differences_of_its_motion(tmp_path):
-    """Central differences over 2e-5 s. Relative differences of 2e-6 and 6.6e-4 are measured, the latter from
-    the fast vibration of the file's closures; 1e-5 and 1e-3 are allowed."""
+    """Central differences over 2e-5 s are the truth. 2e-6 and 6.6e-4 of the largest are measured, the latter
+    from the fast vibration of the file's closures; 1e-5 and 1e-3 are allowed."""
     scene, h = imported(tmp_path, FOUR_BAR, TILTED), 1e-5
     setting = setting_of(scene, STIFFER_RK4)
     run = engine("mujoco").run(scene, np.array([0.1 - h, 0.1, 0.1 + h]), setting)
@@ -124,7 +124,8 @@ def test_stiff_closures_and_small_steps_together_reach_the_motion_of_exact_joint
 
 
 def test_families_of_a_file_are_offered_first_and_for_mujoco_and_scenes_from_files_alone(tmp_path):
-    """Before families such as `tuned`. Exudyn reads no MJCF, and the built-in four-bar is from no file."""
+    """A family is a named set of settings. FAMILIES, which take the file's options, come before others such
+    as `tuned`. Exudyn reads no MJCF, and the built-in four-bar is from no file."""
     scene = imported(tmp_path, FOUR_BAR, TILTED)
     families = list(dict.fromkeys(setting.family for setting in offer("mujoco", scene)))
     assert families[: len(FAMILIES)] == list(FAMILIES) and "tuned" in families[len(FAMILIES) :]
@@ -132,7 +133,7 @@ def test_families_of_a_file_are_offered_first_and_for_mujoco_and_scenes_from_fil
 
 
 def test_quick_depth_runs_the_files_own_settings_as_the_only_family_of_the_file(tmp_path):
-    """Smaller steps and stiffer closures of the file's model are left to the whole depth."""
+    """Quick depth has AS_IN_FILE of FAMILIES; smaller steps and stiffer closures are left to depth whole."""
     scene = imported(tmp_path, FOUR_BAR, TILTED).with_(duration=0.3)
     cases = [Case(scene, np.array([0.0, 0.3]), "mujoco", s) for s in offer("mujoco", scene)]
     few = {case.setting.family for case in of_few_families(cases)}

@@ -63,7 +63,7 @@ def test_cell_shows_the_least_error_and_the_order() -> None:
 def test_last_runs_that_lower_the_least_error_by_less_than_30_percent_are_counted() -> None:
     """`in_vain` counts such runs at the end of a ladder. Runs before the first error below 0.5, and runs with
     as many steps as the run before, do not count."""
-    assert in_vain(runs(4.0, 1e-6)[:3]) == 0, "errors fall by 1/16"
+    assert in_vain(runs(4.0, 1e-6)[:3]) == 0, "errors fall by over 30 %"
     assert in_vain([run(0.1, 0.5), run(0.05, 0.9), run(0.02, 0.8)]) == 0, "no error is below 0.5"
     found = [run(0.1, 1e-6), run(0.05, 0.8e-6), run(0.02, 0.9e-6)]
     assert in_vain(found) == 2 and in_vain([*found, run(0.01, 1e-9)]) == 0
@@ -80,8 +80,8 @@ def test_steps_of_a_ladder_are_halved_and_divide_the_interval_of_samples() -> No
 
 
 def test_a_ladder_ends_where_finer_runs_are_vain_or_would_take_too_long() -> None:
-    """Errors 1e4 h⁴ + 1e-10 reach their floor of 1e-10, after which two runs in vain end the ladder. A run of
-    0.75 TIME_LIMIT is the last, since half the step would take 1.5 TIME_LIMIT."""
+    """Errors 1e4 h⁴ + 1e-10 reach their floor of 1e-10; two runs that do not lower it (`in_vain`) end the
+    ladder. A run of 0.75 TIME_LIMIT is the last, since half the step would take 1.5 TIME_LIMIT."""
     cases = ladder(TUNED_MUJOCO, BENNETT)
 
     def fourth(case: Case) -> dict:

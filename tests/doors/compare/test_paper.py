@@ -1,4 +1,4 @@
-"""Runs / the cells of the paper's tables; singular positions / ranks and residuals known by hand."""
+"""Runs against the tables of the paper, Neto and Ambrósio, Multibody System Dynamics 10 (2003) 81–105."""
 
 import dataclasses
 import math
@@ -85,9 +85,9 @@ def test_every_variant_of_the_paper_s_settings_differs_in_one_setting():
 
 
 def test_errors_near_a_singular_position_raise_the_iterations_of_alf():
-    """One iteration divides errors in the vanishing direction by 1 + α σ², where σ falls with the distance
-    from θ₂ = 0. With exact right-hand sides γ 6 iterations suffice at 1 and at 0.001 rad. With γ off by 1e-8
-    they suffice at 1 rad, nearer positions need more, and 0.03 rad away the limit of 20 is exceeded."""
+    """An iteration of ALF, the augmented Lagrangian formulation, divides errors in the vanishing direction by
+    1 + α σ², where σ falls with the distance from θ₂ = 0. Up to 6 are measured if the right-hand side γ is
+    exact, or off by 1e-8 at 1 rad. Nearer positions need more, at 0.03 rad over the limit of 20."""
     exact = [singular.alf_iterations(distance, 0.0) for distance in (1.0, 0.001)]
     wrong = [singular.alf_iterations(distance, 1e-8) for distance in (1.0, 0.1, 0.03, 0.01)]
     assert max(exact) <= 6, f"iterations with γ exact, 1 and 0.001 rad from θ₂ = 0: {exact}"

@@ -152,7 +152,7 @@ def test_no_setting_reaches_an_error_below_the_truth_s_bound(bound, settings):
 
 def test_steps_are_limited_by_the_longest_interval_between_samples():
     """Steps end at samples: with samples at 0.1, 0.3 and 0.4 s, longer steps run as 0.2 s. ``within`` leaves
-    out them; the longest one is in their place, with beta ~ 1 / step."""
+    these out; a step of the longest interval is in their place, with beta ~ 1 / step."""
     assert longest_step([0.1, 0.3, 0.4]) == pytest.approx(0.2, rel=1e-14)
     assert longest_step([0.5]) == 0.5
     steps = [Setting("f", {"step": h, "beta": 0.2 / h}) for h in (0.4, 0.1, 0.025)]

@@ -148,9 +148,9 @@ SITUATIONS = {
 
 
 @pytest.mark.parametrize("situation", SITUATIONS)
-def test_verdict_of_a_situation_has_the_sentences_of_the_snapshot(situation, snapshot):
-    """The snapshot has the sentences on the records of SITUATIONS. Their errors and times are those that the
-    records above give; whether the sentences are true of them was judged by reading."""
+def test_verdict_says_in_each_situation_who_is_right_how_fast_and_where_runs_break(situation, snapshot):
+    """SITUATIONS are made-up records, whose errors and times the sentences repeat. The snapshot has the
+    sentences, which were compared with the records by hand."""
     groups = SITUATIONS[situation]
     said = {"headline": headline(groups), "right": right(groups), "fast": fast(groups)}
     assert {**said, "breaks": breaks(groups), "truth": truth(groups)} == snapshot
@@ -164,9 +164,9 @@ def test_defaults_without_a_truth_are_not_judged(snapshot):
 
 
 def test_runs_that_end_at_the_start_of_an_unknown_motion_are_not_judged():
-    """Of an unknown motion the start alone is known. There every run agrees with the scene, so that ENDED, a
-    run that ends there with an error of zero, judges no engine, alone or beside runs without an error. Of a
-    known motion it does."""
+    """ENDED ends at its start, where each run agrees with the scene, so that its error is zero. If no later
+    time of the true motion is known, this says nothing of an engine, also beside runs without an error. If
+    the motion is known, the early end does."""
     completed = [{**record(n, TUNED, None), "times": [0.0, 1.0]} for n in ("mbref", "mujoco")]
     assert not any(group([ENDED, *more], **UNKNOWN).is_judged for more in ([], completed))
     assert group([ENDED]).is_judged
@@ -205,13 +205,13 @@ def printed(records: Sequence[dict[str, Any]], scene=REDUNDANT, **known: Any) ->
 
 
 def test_without_a_truth_no_setting_is_called_most_accurate():
-    """Two runs of a motion without a truth, coarse to fine, have no errors: no setting is recommended, and
-    the finest run stands in the table of one run an engine."""
-    runs = [synthetic.record("mbref", "own", 1e-9, 0.1, step=step) for step in (0.1, 0.2)]
+    """Two runs of a motion without a truth, of steps of 0.2 and 0.1 s, have no errors: no setting is
+    recommended, and the finer run stands in the table of one run an engine."""
+    runs = [synthetic.record("mbref", "own", 1e-9, 0.1, step=step) for step in (0.2, 0.1)]
     shown = printed([{**run, "metrics": {}} for run in runs], synthetic.scene(), **UNKNOWN)
     assert "least error" not in shown and "most accurate" not in shown and "crosscheck run" not in shown
     assert "a finest run of every engine" in shown
-    assert "step=0.2" in shown.partition("a finest run")[2].partition("settings to use")[0]
+    assert "step=0.1" in shown.partition("a finest run")[2].partition("settings to use")[0]
 
 
 def test_a_right_engine_that_gives_no_time_of_stepping_reaches_its_error():

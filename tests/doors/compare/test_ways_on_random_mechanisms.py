@@ -1,4 +1,4 @@
-"""Alternatives of engines on random mechanisms: differences of ways, their causes, and the stored records."""
+"""Ways of an engine, settings that should give equal accelerations: differences, causes, stored records."""
 
 import pytest
 
