@@ -74,8 +74,8 @@ def angular_acceleration(angle, rate, moment, along):
 
 @pytest.mark.parametrize(("name", "accuracy"), [("mbref", ACCURATE), ("judge", BOUND)])
 def test_derivatives_of_a_trammel_equal_those_of_its_closed_form(name, accuracy):
-    """With φ the rod's angle from the x rail, its angular velocity is -φ'. Along φ the twists change by the
-    least δv in the metric of the masses: δφ' = -φ' A'/(2 A) δφ, since A φ'² = vᵀ M v."""
+    """The rod's angular velocity is -φ', φ being its angle from the x rail. A derivative by position includes
+    the least δv, in the metric of the masses: δφ' = -φ' A'/(2 A) δφ, since A φ'² = vᵀ M v."""
     numbers = {"angle": START, "rate": RATE, "moment": 0.0, "along": ALONG}
     true = {key: slope(angular_acceleration, numbers, key) for key in numbers}
     s, c = np.sin(START), np.cos(START)
@@ -106,7 +106,7 @@ def test_derivatives_of_a_pendulum_equal_those_of_its_closed_form(name, accuracy
 
 def test_derivatives_of_a_driven_slider_equal_those_of_its_closed_form():
     """C is R = x_C - x_B ahead of B and w = y_C - y_B above it; with ẏ = Ω x_B and ÿ = -Ω² y_B the slider has
-    the acceleration (w ÿ - ẏ²)/R - (w ẏ)²/R³ - Ω² x_B. The reaction of its rail is as ``sensitivities``."""
+    the acceleration (w ÿ - ẏ²)/R - (w ẏ)²/R³ - Ω² x_B. The moment at A is as by ``sensitivities``."""
     numbers = {"bx": 0.2, "by": 0.1, "cx": 0.9, "cy": 0.5}
     paths = ["joint[B].anchor.x", "joint[B].anchor.y", "joint[C].anchor.x", "joint[C].anchor.y"]
 
@@ -126,7 +126,7 @@ def test_derivatives_of_a_driven_slider_equal_those_of_its_closed_form():
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_derivatives_of_a_random_mechanism_equal_the_judges(seed):
-    """Couplings, armatures, drivers, all loads, massless links and redundant rows."""
+    """The judge's have bounds of 1e-12. mbref's differ by 1e-8, and 99 % of them by ten stated errors."""
     scene = powered_mechanism(seed)
     numbers = [f"body[{scene.body[0].name}].mass", "gravity.y", f"joint[{scene.joint[-1].name}].anchor.x"]
     found, (true, bounds) = mbref.state_derivatives(scene, to=numbers), bounded_derivatives(scene, numbers)
@@ -150,7 +150,8 @@ def flat_parallelogram() -> Scene:
     return Scene(name="flat", duration=1.0, body=bodies, joint=joints)
 
 
-def test_no_derivatives_at_a_singular_position_or_off_the_constraints():
+def test_derivatives_are_refused_at_a_singular_position_off_the_constraints_and_by_a_start_angle():
+    """Two branches meet in the flat pose, q + 0.01 opens the loop, and a state is no start of a motion."""
     flat = flat_parallelogram()
     with pytest.raises(mbref.InputError, match="singular position"):
         mbref.state_derivatives(flat)

@@ -1,4 +1,5 @@
-"""The command `crosscheck derivatives` on engines with right and with faulty derivatives."""
+"""The command `crosscheck derivatives` on engines, and on those of tests/zoo/gradients, each with one planted
+fault (NONE has none). A card is an identity that right derivatives satisfy, such as virtual work."""
 
 import json
 
@@ -61,6 +62,7 @@ def loop(tmp_path) -> str:
     ids=[*FOUND, *WHIRLING],
 )
 def test_each_faulty_gradient_of_the_zoo_is_found_with_its_cause(name, scene, words):
+    """FOUND has where each is wrong: terms of velocities vanish at rest, stabilisation on closed loops."""
     said = [*sentences.of_rows([*compare.rows(ENGINES[name], scene)])]
     assert len(said) == bool(words)
     assert all("wrong by" in sentence and words in sentence for sentence in said)
@@ -69,6 +71,7 @@ def test_each_faulty_gradient_of_the_zoo_is_found_with_its_cause(name, scene, wo
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ENGINES)
 def test_each_faulty_gradient_fails_a_card_and_a_right_one_passes_all_cards(name):
+    """NONE is right. A failure without a reason is an error that exceeds the card's limit."""
     first = next((verdict for verdict in verdicts(ENGINES[name]) if verdict.fails), None)
     assert (first is None) == (name == "NONE"), first
     assert first is None or not first.reason
@@ -79,6 +82,7 @@ def test_each_faulty_gradient_fails_a_card_and_a_right_one_passes_all_cards(name
     [("closures", "VELOCITY_SIGN"), ("energy", "FORCE_SIGN"), ("virtual work", "NO_GYROSCOPIC")],
 )
 def test_cards_find_faults_of_a_body_on_a_link_without_the_judges_derivatives(card, fault):
+    """NONE, without fault, satisfies an identity to rounding; a fault violates it by more than 1e-3."""
     right, wrong = (
         CARDS[card].check(Subject(ENGINES[name], "own"), SPATIAL[0].make()) for name in ("NONE", fault)
     )
@@ -87,7 +91,7 @@ def test_cards_find_faults_of_a_body_on_a_link_without_the_judges_derivatives(ca
 
 @pytest.mark.slow
 def test_command_prints_the_cards_that_an_engine_passes(capsys):
-    """mbref has derivatives along allowed motions, without accelerations of its own off the constraints."""
+    """mbref passes all; "differences" is not asked, as it has no accelerations off the constraints."""
     assert main(["derivatives", "mbref", "--cards", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["cards"]
     assert {each["card"] for each in found} == {*CARDS} and not any(each["fails"] for each in found)
@@ -105,13 +109,14 @@ def test_card_that_has_nothing_to_compare_gives_a_reason_in_place_of_a_pass():
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "words"), [("NONE", ""), ("VELOCITY_SIGN", MOVES)])
 def test_command_fails_if_a_derivative_is_wrong_and_says_on_what_it_depends(loop, name, words, capsys):
+    """NONE is right. VELOCITY_SIGN has the wrong sign of J̇ v, which is zero at rest: status 1."""
     assert main(["derivatives", f"{ZOO}:{name}", loop]) == bool(words)
     printed = capsys.readouterr().out
     assert ("wrong by" in printed) == bool(words) and words in printed
 
 
-def test_mbref_is_right_and_engines_without_derivatives_are_refused_with_the_owner(tmp_path, capsys):
-    """The mechanism is the body on its pin alone; `make deep` tests loops."""
+def test_mbref_is_right_and_an_engine_that_lacks_derivatives_is_refused_as_lacking_them(tmp_path, capsys):
+    """The truth are the judge's, of a body on a pin; `make deep` tests loops. Exudyn has none."""
     scene = pinned()
     scene.with_(joint=scene.joint[:1]).save(tmp_path / "pin.toml")
     assert main(["derivatives", "mbref", "exudyn", str(tmp_path / "pin.toml"), "--json"]) == 0
@@ -123,8 +128,8 @@ def test_mbref_is_right_and_engines_without_derivatives_are_refused_with_the_own
     assert "exudyn" in refused["engine"] and "missing in the engine" in refused["reason"]
 
 
-def test_stored_results_are_those_of_the_page_and_can_be_of_another_file(tmp_path, capsys):
-    """Without --records the command shows the records that the page is made from."""
+def test_command_shows_the_committed_results_or_those_of_another_file(tmp_path, capsys):
+    """Committed are all MECHANISMS. A file with mbref's records alone gives a page without Pinocchio."""
     assert main(["derivatives", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert {row["scene"] for row in found["rows"]} == {mechanism.name for mechanism in MECHANISMS}
@@ -138,7 +143,7 @@ def test_stored_results_are_those_of_the_page_and_can_be_of_another_file(tmp_pat
 @pytest.mark.slow
 @pytest.mark.skipif(not installed("pinocchio"), reason="needs Pinocchio")
 def test_pinocchio_is_right_about_a_link_of_constant_length_that_its_adapter_makes_a_rod(loop, capsys):
-    """The rod has inertia about its axis, and derivatives are along motions on which it does not spin."""
+    """The rod has inertia and does not spin. Six: by q, v and forces, in motion and at rest."""
     main(["derivatives", "pinocchio", loop, "--json"])
     found = json.loads(capsys.readouterr().out)["rows"]
     judged = [row for row in found if row["truth"] == "judge" and row["function"] == "LOCAL"]
@@ -148,6 +153,7 @@ def test_pinocchio_is_right_about_a_link_of_constant_length_that_its_adapter_mak
 @pytest.mark.slow
 @pytest.mark.skipif(not installed("drake"), reason="needs Drake")
 def test_drakes_terms_are_differentiated_right_also_with_open_loops(loop, capsys):
+    """The truth are the judge's; with open loops, differences of Drake's own accelerations."""
     assert main(["derivatives", "drake", loop, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["rows"]
     assert {row["grade"] for row in found} == {"right"}
@@ -156,7 +162,7 @@ def test_drakes_terms_are_differentiated_right_also_with_open_loops(loop, capsys
 
 @pytest.mark.slow
 def test_mujocos_derivatives_are_right_about_a_turning_body_whose_line_slides_along_a_point(tmp_path, capsys):
-    """MuJoCo's model is a ball joint and, behind it, a slide of one body."""
+    """By the judge's derivatives. MuJoCo's model is a ball joint and, behind it, a slide of one body."""
     body = {"name": "b", "mass": 1.3, "inertia": [0.02, 0.03, 0.04], "position": [0.1, 0.0, 0.2]}
     line = {"name": "J", "type": "inline", "bodies": ["b", "ground"], "axis": [0.6, 0.0, -0.8]}
     joint, turning = {**line, "anchor": [0.3, 0.1, 0.0]}, {**body, "angular_velocity": [1.0, 2.0, 3.0]}
@@ -169,7 +175,8 @@ def test_mujocos_derivatives_are_right_about_a_turning_body_whose_line_slides_al
 @pytest.mark.slow
 @pytest.mark.skipif(not installed("pinocchio"), reason="needs Pinocchio")
 def test_known_defects_of_pinocchios_derivatives_are_found(capsys):
-    """Findings pinocchio-derivatives-of-point-closure and -of-open-closure."""
+    """By its two findings they are wrong by position if a loop is closed at a point (``pinned``), and off the
+    constraints with Baumgarte's terms in LOCAL_WORLD_ALIGNED."""
     main(["derivatives", "pinocchio", "--json"])
     found = json.loads(capsys.readouterr().out)
     wrong = [row for row in found["rows"] if row["grade"] == "wrong"]
@@ -212,7 +219,8 @@ def test_mjxs_step_is_differentiated_right_and_leaves_out_a_term_of_the_exact_mo
 @pytest.mark.slow
 @pytest.mark.skipif(not installed("drake"), reason="needs Drake")
 def test_drakes_terms_hold_a_gear_pair_in_a_loop_where_derivatives_are_taken():
-    """A plant without time step, whose terms are differentiated, has no constraints of its own."""
+    """Both cards ask for a gear pair and a cam. Drake's plant for derivatives has no constraints of its
+    own."""
     found = [*verdicts(ENGINE, ["couplings, closures", "couplings, virtual work"])]
     assert [verdict.error is not None for verdict in found] == [True, False] * 2  # a cam is refused
     assert not any(verdict.fails for verdict in found)

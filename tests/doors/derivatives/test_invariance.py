@@ -66,8 +66,8 @@ def test_derivatives_follow_the_units_of_length_and_time():
 
 
 def test_derivatives_by_forces_and_stiffness_at_rest_are_symmetric():
-    """Nᵀ M a_u of the potential of gravity is symmetric after the changes of N and of the inertia tensors J:
-    with angular velocities ω_i by unit u_i, ∂ω_i/∂u_j has the part ω_j × ω_i / 2 that is not symmetric."""
+    """Gravity's stiffness, the second derivative of its potential, is Nᵀ M a_u with changes of N and of
+    inertia tensors J. For angular velocities ω_i by unit u_i, ∂ω_i/∂u_j has the part ω_j × ω_i / 2."""
     scene = mechanism()
     scene = scene.with_(body=[body.model_copy(update=STILL) for body in scene.body])
     found = derivatives(scene)

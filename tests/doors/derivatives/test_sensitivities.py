@@ -189,9 +189,9 @@ def test_equilibrium_of_a_pendulum_with_a_torsion_spring_moves_as_in_closed_form
 
 @pytest.mark.slow
 def test_equilibrium_of_two_coupled_links_moves_with_their_pin_as_in_closed_form():
-    """With angles a and b of the links from rest, the potential is g (m₁ y₁ + m₂ y₂) + 8 (a + b - n)²/2 +
-    15 (b - n')², as the wheel turns by a + b. Its gradient changes by (0, -m₂ g) if the pin moves along x.
-    The effect of the pin on the closed pose is rounding, which may underflow."""
+    """With angles a and b of the links from rest and natural angles n, n', the potential is g (m₁ y₁ + m₂ y₂)
+    + 8 (a + b - n)²/2 + 15 (b - n')², as the wheel turns by a + b. Its gradient changes by (0, -m₂ g) if the
+    pin moves along x, which leaves the pose."""
     bodies = [
         body("rod", 1.2, [0.01, 0.02, 0.03], (0.3, 0.05, 0.0)),
         body("arm", 0.7, [0.01, 0.02, 0.02], (0.8, 0.1, 0.0)),
@@ -207,13 +207,7 @@ def test_equilibrium_of_two_coupled_links_moves_with_their_pin_as_in_closed_form
         joint=[hinge(name, *end, armature=armature[name]) for name, end in ends.items()],
         coupling=[{"name": "s", "joints": [*ends], "ratios": [1.0, 1.0, -1.0]}],
         load=[
-            {
-                "type": "torsion_spring",
-                "joint": "W",
-                "stiffness": 8.0,
-                "damping": 0.3,
-                "natural_angle": -14.0,
-            },
+            {"type": "torsion_spring", "joint": "W", "stiffness": 8.0, "damping": 0.3, "natural_angle": -14},
             {"type": "torsion_spring", "joint": "B", "stiffness": 30.0, "damping": 0.1},
         ],
     )
