@@ -1,4 +1,5 @@
-"""The compiled DOP853 against closed forms, and engines' compiled families against truths."""
+"""The compiled DOP853 against closed forms, and families of settings, in which it integrates an engine's
+accelerations ("compiled"), against truths."""
 
 import ctypes
 from collections.abc import Callable
@@ -155,7 +156,7 @@ def off_gauss(scene: Scene, run: Trajectory) -> dict[str, float]:
 
 
 def error_of(scene: Scene, run: Trajectory) -> float:
-    """Return the largest error of poses (m, rad) of a complete run."""
+    """Return the largest error of poses (m, rad) of a complete run, from the judge's truth."""
     assert run.outcome is Outcome.COMPLETED, run.message
     return measure(scene, run, truth_for(scene))["error"]
 
@@ -234,7 +235,7 @@ def test_a_failed_run_of_mujocos_compiled_family_has_the_samples_before_its_end(
 def test_mujocos_projected_compiled_family_gives_the_true_motion_through_singular_positions(
     name, rtol, shortest, measured
 ):
-    """Errors are at most ten times the measured ones; joints are closed to 1e-12 of the length."""
+    """Errors are at most ten times the measured ones; projection closes joints to 1e-12 of the length."""
     pytest.importorskip("mujoco")
     scene = SCENES[name]()
     run = simulate("mujoco", scene, 11, PROJECTED, rtol=rtol, min_step=shortest, beta=0.0, hard=1e-9)

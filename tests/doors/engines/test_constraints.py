@@ -115,8 +115,8 @@ def differences(state: Consistent) -> Differences:
 @pytest.mark.parametrize("name", MECHANISMS)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_polynomials_mbref_and_judge_have_equal_constraints_of_mechanisms(name: str, seed: int) -> None:
-    """Three codes, in a state disturbed by 0.02 m and rad and then projected. Residuals are below 1e-13; row
-    spaces and least-norm accelerations differ by at most ten times the measured 2.1e-14 and 8e-13."""
+    """The adapters' polynomials, mbref and the judge agree 0.02 m and rad from the start: residuals are below
+    1e-13; row spaces and least-norm accelerations within ten times the measured 2.1e-14 and 8e-13."""
     found = differences(Consistent(MECHANISMS[name], 0.001 * seed, seed, 0.02))
     assert found.phi < MARGIN * ROUNDING and found.spaces < MARGIN * SPACES
     assert found.accelerations < MARGIN * ACCELERATIONS
@@ -125,8 +125,8 @@ def test_polynomials_mbref_and_judge_have_equal_constraints_of_mechanisms(name: 
 @pytest.mark.parametrize("kind", KINDS)
 @given(data=st.data())
 def test_polynomials_mbref_and_judge_have_equal_constraints_of_random_joints(kind, data):
-    """Three codes, of one joint that a driver may move. Residuals are below 1e-13; row spaces and least-norm
-    accelerations differ by at most ten times the measured 2.1e-14 and 8e-13."""
+    """The adapters' polynomials, mbref and the judge agree on a joint that may be driven: residuals are below
+    1e-13; row spaces and least-norm accelerations within ten times the measured 2.1e-14 and 8e-13."""
     is_driven = kind in DRIVABLE and data.draw(st.booleans())
     scene = data.draw(one_joint_scenes(kind, is_driven))
     found = differences(Consistent(scene, data.draw(st.floats(0, 0.3)), data.draw(st.integers(0, 99)), 0.1))

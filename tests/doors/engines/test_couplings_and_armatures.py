@@ -201,7 +201,7 @@ def test_recorded_angle_that_counts_from_the_assembled_pose_is_judged_wrong():
 
 
 def test_find_scenes_assembles_offsets_and_read_scenes_does_not(tmp_path):
-    """Both read a scene file with an offset of 0.4 rad in its coupling."""
+    """Poses of an assembled scene obey the offset of its coupling, 0.4 rad; those in the file do not."""
     scene, path = shifted(gear_pair, "teeth", 0.4), str(tmp_path / "gears.toml")
     scene.save(path)
     assert find_scenes([path]) == [mbref.assembled(scene)] and read_scenes([path]) == [scene]

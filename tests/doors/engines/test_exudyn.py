@@ -151,7 +151,7 @@ def test_exudyns_static_analysis_ends_before_a_singular_pose():
 
 
 def test_exudyn_moves_a_driven_scene_without_masses_and_refuses_a_free_one():
-    """Positions of the driven scene are equal to the bit with masses and without."""
+    """Without masses only the static analysis serves; its positions equal those with masses to the bit."""
     scene = SCENES["four_bar"]()
     bare = scene.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in scene.body))
     assert ENGINE.cannot(bare) is None

@@ -131,6 +131,6 @@ class Geared(type(engine("mbref"))):
     ],
 )
 def test_hint_knows_armatures_and_couplings(defect, scene, says):
-    """The judge's accelerations contain armatures: an engine with them is right, one without them wrong."""
+    """`Geared` has the ``defect``. Positions that are given 0.1 mm aside leave accelerations right."""
     found = hint(InProcess(Geared(*defect), "mbref"), [Failure(KNOWN[scene], "truth")])
     assert says in found, found

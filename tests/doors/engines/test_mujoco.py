@@ -1,4 +1,4 @@
-"""MuJoCo / truths; callbacks and files that an adapter must not leave behind."""
+"""MuJoCo's runs against truths; callbacks and files that an adapter must not leave behind."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Adapters with one planted defect / the reference."""
+"""Adapters with one planted defect are off the judge's reference."""
 
 import functools
 import importlib
@@ -132,7 +132,7 @@ def planted(name: str, defect: dict[str, str], folder: Path) -> Engine:
 
 
 def test_each_text_that_a_defect_replaces_is_once_in_its_file():
-    """The defects of defects_of_adapters.toml; most are planted by `make deep` alone."""
+    """A defect replaces its text, which has to be unique. `make deep` plants most of the over 90 defects."""
     planned = [(package(way), defect) for way, found in DEFECTS.items() for defect in found]
     missing = [
         (name, defect)

@@ -1,4 +1,4 @@
-"""The engine Newton / truths, the judge's start and accelerations. Its kernels compile for minutes."""
+"""The engine Newton against the judge's truths, start and accelerations. Its kernels compile for minutes."""
 
 from importlib.util import find_spec
 

@@ -1,4 +1,4 @@
-"""OndselSolver / truths, Pinocchio, and what it does not offer."""
+"""OndselSolver against truths and Pinocchio, and scenes that it does not move."""
 
 import math
 from functools import partial

@@ -1,4 +1,4 @@
-"""Optional engines / installed packages: what is missing is named, listed, and not run by default."""
+"""Optional engines whose packages are missing are named, listed, and not run by default."""
 
 from importlib import metadata
 

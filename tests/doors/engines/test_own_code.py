@@ -1,4 +1,4 @@
-"""Code or XML that crosscheck shows for a run with an engine / the settings that its adapter makes."""
+"""Code or XML that crosscheck shows for a run makes the settings that the engine's adapter makes."""
 
 import re
 from typing import Any

@@ -1,4 +1,4 @@
-"""Pinocchio / truths, and the traps that give silently wrong answers."""
+"""Pinocchio's runs against truths, and settings that give silently wrong answers."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Planar joints in every engine / closed forms, and the truth of the mechanism whose guide one replaces."""
+"""Planar joints in every engine against closed forms."""
 
 import numpy as np
 import pytest

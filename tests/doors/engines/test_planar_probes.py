@@ -1,4 +1,4 @@
-"""Planar probes: an engine of hinges and slides / the scenes that the suite holds it against."""
+"""Planar probes, loops in a plane that the suite runs on engines that map no joints in space."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""MuJoCo's ports / MuJoCo in C at the same settings, and truth; their code is compiled for minutes first."""
+"""MuJoCo's ports against MuJoCo in C and truths; their code is compiled for minutes first."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The suite as pytest tests: a sound engine and a faulty one / what a developer sees, keeps and replays."""
+"""The suite as pytest tests, of a sound engine and a faulty one: what is run, kept and reported."""
 
 import os
 import subprocess

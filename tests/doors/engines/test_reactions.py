@@ -1,4 +1,4 @@
-"""Reactions of engines / mbref and the judge; shares of redundant hinges / statics by hand."""
+"""Reactions of engines against the judge's; shares of redundant hinges against statics by hand."""
 
 import numpy as np
 import pytest

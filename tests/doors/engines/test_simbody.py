@@ -1,4 +1,4 @@
-"""Simbody / truths, Pinocchio, prescribed motion, and what OpenSim cannot."""
+"""Simbody's runs against truths, and drivers that OpenSim cannot prescribe."""
 
 from importlib.util import find_spec
 
@@ -44,8 +44,8 @@ def test_simbody_stays_within_its_measured_error_of_the_truth(name, duration, me
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_accuracy_of_a_hundredth_reduces_simbody_s_error_fivefold(family: str) -> None:
-    """Errors from the judge's truth at accuracies of 1e-4, 1e-6 and 1e-8; an accuracy that had no effect
-    would leave the error, and one to which the error is proportional would reduce it a hundredfold."""
+    """Errors from the judge's truth at accuracies of 1e-4, 1e-6 and 1e-8. An accuracy without effect would
+    leave the error, one to which it is proportional would reduce it a hundredfold; five is between."""
     scene = SCENES["spatial_slider_crank"]()
     errors = [
         completed_error(simulate(scene, 0.02, accuracy, family), scene) for accuracy in (1e-4, 1e-6, 1e-8)

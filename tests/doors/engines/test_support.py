@@ -1,4 +1,4 @@
-"""Support matrix: engines' refusals and notes / probes of every feature, and Gauss's principle."""
+"""Support matrix: engines' refusals and their notes, and a probe, a small scene, of every feature."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Drake, DART and Bullet / Gauss's principle, truths and each engine's own terms."""
+"""Drake, DART and Bullet against truths; "terms" are masses and forces that crosscheck takes from them."""
 
 import functools
 import math

@@ -1,4 +1,4 @@
-"""The built-in engines / the checks of the suite, in this process; what fails is known, with its reason."""
+"""Checks of the suite on the built-in engines, in this process; failures are known, with their reasons."""
 
 from dataclasses import replace
 
@@ -57,7 +57,7 @@ def test_built_in_engine_violates_no_check_on_six_probes(name):
     ],
 )
 def test_built_in_engine_violates_only_known_checks_of_couplings_relations_and_laws(name, scenes, related):
-    """KNOWN has the reasons; findings and the page on invariants have the numbers of laws."""
+    """Those in KNOWN fail for the reasons given there, and no others."""
     found = [verdict for scene in scenes for verdict in verdicts(name, scene, related)]
     failed = {(name, each.scene, each.property): each for each in found if each.status == "fail"}
     assert set(failed) == known(name, scenes), failed

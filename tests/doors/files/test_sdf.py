@@ -1,4 +1,4 @@
-"""SDF files / the scenes that they were written from, with links and joints in frames of their own."""
+"""SDF files against the scenes that they were written from, with links and joints in frames of their own."""
 
 import numpy as np
 import pytest

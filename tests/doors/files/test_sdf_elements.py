@@ -1,4 +1,4 @@
-"""SDF files of one link and joint / bodies, joints and sentences worked out by hand."""
+"""SDF files of one link and joint against bodies, joints and sentences worked out by hand."""
 
 from pathlib import Path
 from typing import Any
