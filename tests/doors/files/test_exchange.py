@@ -119,7 +119,7 @@ def test_an_exported_scene_accelerates_in_mujoco_and_moves_when_read_again_as_th
 
 
 def test_joints_of_a_file_become_joints_of_the_scene_by_name_and_kind():
-    """px is a row of slides and hinges in a plane, u1 two hinges that cross."""
+    """In the file, px is a row of slides and hinges in a plane, u1 two hinges that cross, motor a hinge."""
     scene = formats.read(MODELS / "delta_leg.xml").scene
     expected = {"motor": "revolute", "u1": "universal", "px": "planar"}
     expected |= dict.fromkeys(("ball_a", "end_a", "end_b"), "spherical")

@@ -103,8 +103,8 @@ def test_file_with_an_unsupported_element_or_a_fault_is_refused_with_its_name(na
 
 @pytest.mark.parametrize("name", [n for n in READ if n.endswith(".urdf") and "mimic" not in n])
 def test_pinocchio_builds_the_machine_of_the_urdf(name):
-    """Bodies, joints and couplings, and the mass matrix and weight at four poses, equal the file's. Files
-    with mimic elements are left out, as Pinocchio loses some of them."""
+    """A machine's bodies, joints and couplings, and its mass matrix and weight at four poses, equal the
+    file's. Files with mimic elements are left out, as Pinocchio loses some of them."""
     pytest.importorskip("pinocchio")
     file = file_of(KINDS / name)
     reading = built(Pinocchio(), file.path, file.form, replace(file.asked, states=(), starts=()))

@@ -42,8 +42,7 @@ def test_a_limit_that_acts_at_the_start_is_refused_or_left_out_on_request(files,
 
 @pytest.mark.parametrize(("flag", "left"), [("spring", (0.0, 3.0)), ("damper", (2.0, 0.0))])
 def test_a_switch_of_a_file_turns_off_springs_or_dampers_of_tendons(files, flag, left):
-    """MuJoCo's reference, flag: ``spring`` and ``damper`` disable
-    springs (2 N/m) and dampers (3 N s/m) of tendons."""
+    """By MuJoCo's reference <flag> disables springs (2 N/m) or dampers (3 N s/m), also of tendons."""
     text = LIMITED.format(joint="", tendon="stiffness='2' damping='3'")
     text = text.replace("<worldbody>", f"<option><flag {flag}='disable'/></option><worldbody>")
     [load] = files.scene(text, "a.xml")[0].load

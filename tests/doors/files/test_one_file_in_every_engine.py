@@ -1,4 +1,5 @@
-"""One file in every engine: the file's meaning, planted differences by part and kind, verdicts and advice."""
+"""One file in every engine: its meaning, planted differences by part and kind, verdicts and advice. A machine
+is what a file means or a reader makes of it: bodies, joints, loops and couplings."""
 
 import json
 import re
@@ -204,7 +205,7 @@ def test_constraint_rows_of_mujoco_are_the_files_at_four_closed_poses(kind, tmp_
 
 
 @pytest.mark.parametrize("what", [pytest.param("ball", marks=pytest.mark.slow), "free", "connect", "joint"])
-def test_motion_is_mbrefs_and_mujocos(what: str, tmp_path: Path):
+def test_mbref_and_mujoco_end_runs_where_the_meaning_of_the_file_does(what: str, tmp_path: Path):
     """Runs of 0.1 s from a random state that obeys the equalities end where those of the file's own meaning
     do: our import by mbref to 1e-7, and MuJoCo in small steps, whose equalities are soft, to 1e-3."""
     file = file_of(written(tmp_path, carried_by(TREES[what]) if what in TREES else one_equality(what)))

@@ -38,15 +38,8 @@ def test_last_record_of_a_key_replaces_earlier_ones(tmp_path: Path):
 def test_lines_that_are_no_records_are_reported_by_number_and_kept(tmp_path, capsys):
     """Text, a key that is no text, NaN, a list, and brackets too deep for a parser, between two records."""
     path = tmp_path / "runs.jsonl"
-    lines = [
-        '{"key": "a"}',
-        "notes",
-        '{"key": 1}',
-        '{"key": "n", "x": NaN}',
-        "[1]",
-        '{"key": "b"}',
-        "[" * 9000,
-    ]
+    middle = ["notes", '{"key": 1}', '{"key": "n", "x": NaN}', "[1]"]
+    lines = ['{"key": "a"}', *middle, '{"key": "b"}', "[" * 9000]
     path.write_text("\n".join(lines) + "\n")
     assert set(stored(path)) == {"a", "b"}
     assert capsys.readouterr().err == f"{path}: line 2, 3, 4, 5, 7 holds no record and was left unchanged\n"

@@ -17,13 +17,8 @@ VALID = {
         {"name": "bolt", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "position": [1.0, 0.0, 0.0]},
     ],
     "joint": [
-        {
-            "name": "H",
-            "type": "revolute",
-            "bodies": ["ground", "leaf"],
-            "anchor": [0, 0, 0],
-            "axis": [0, 0, 1],
-        },
+        {"name": "H", "type": "revolute", "bodies": ["ground", "leaf"]}
+        | {"anchor": [0, 0, 0], "axis": [0, 0, 1]},
         {"name": "S", "type": "spherical", "bodies": ["leaf", "bolt"], "anchor": [1, 0, 0]},
     ],
     "driver": [{"joint": "H", "polynomial": [0.0, 1.0]}],

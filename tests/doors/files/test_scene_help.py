@@ -61,7 +61,7 @@ FAULTY = {
 
 @pytest.mark.parametrize("name", FAULTY)
 def test_each_fault_is_one_sentence_with_its_line_and_a_suggestion(name, tmp_path, snapshot):
-    """Snapshots of the faults of the template after one change; FAULTY has the changed text."""
+    """FAULTY has one change of the template each; the sentences of the snapshot were checked by reading."""
     assert faults(tmp_path, *FAULTY[name]) == snapshot
 
 
@@ -139,7 +139,8 @@ def turning(rate: float | str) -> list[dict]:
     ],
 )
 def test_probable_slip_is_one_sentence(path, value, slip):
-    """Slips are mm in gravity, inertia and an anchor, no joints, and a turn of more than 100 rad in 1 s."""
+    """Slips are mm in gravity, inertia and an anchor, no joints, and a turn of more than 100 rad in 1 s. The
+    rod of 0.4048 kg would have the radius √(2.1e4 / 2 / 0.4048) = 161 m; C is at x = 0.709 m."""
     scene = find_scene("planar_slider_crank").with_(duration=1.0, load=())
     [found] = probable_slips(scene.with_(path, value))
     assert found.startswith(slip)
@@ -178,12 +179,8 @@ def with_hinges(*axes, height: float = 0.0) -> Scene:
         (with_hinges(*[(1.0, 0.0, 0.0)] * 3), 0),
     ],
     ids=[
-        "one in the plane",
-        "none in the plane",
-        "at 45 degrees",
-        "no common plane",
-        "two of four",
-        "three of five",
+        *("one in the plane", "none in the plane", "at 45 degrees"),
+        *("no common plane", "two of four", "three of five"),
     ],
 )
 def test_only_a_single_hinge_axis_in_the_plane_of_a_planar_mechanism_is_a_probable_slip(scene, slips):
@@ -217,7 +214,8 @@ def test_orientation_in_degrees_is_refused_with_the_formula_of_the_quaternion():
 
 @pytest.mark.parametrize("text", ["wide", "3 parsec", "30 deg", "1e999 mm", "1 2 mm"])
 def test_text_that_is_no_length_is_refused_in_a_sentence(text, snapshot):
-    """A word, and numbers with an unknown unit, a unit of angle, too large a value, or a second number."""
+    """A word, numbers with an unknown unit, a unit of angle, a huge value, two numbers; the snapshot was
+    read."""
     with pytest.raises(SceneError) as caught:
         find_scene("four_bar").with_("joint[A].anchor", [text, 0.0, 0.0])
     assert caught.value.faults == snapshot
@@ -360,7 +358,8 @@ def test_command_animate_names_the_option_that_shows_several_branches(tmp_path, 
     ],
 )
 def test_command_animate_states_why_there_are_no_branches(words, says, tmp_path, capsys, monkeypatch):
-    """Each position has one branch, there are none or too few, or the method detects none."""
+    """The five-bar has one branch at a quarter turn, π/2 / 124.8 s; others pass none or two, or detect
+    none."""
     monkeypatch.chdir(tmp_path)
     assert main(["animate", *words.split(), "--branches"]) == 2
     assert says in capsys.readouterr().err and not list(tmp_path.iterdir())
@@ -375,7 +374,8 @@ def test_command_list_prints_every_name_within_eighty_columns(capsys):
 
 
 def test_progress_in_a_pipe_prints_at_most_a_line_in_ten_seconds(capsys):
-    """A run of 2 s is at 0.1, 0.5, 0.6 and 1.5 s when the clock shows 1, 12, 13 and 30 s."""
+    """A run of 2 s is at 0.1, 0.5, 0.6 and 1.5 s when the clock shows 1, 12, 13 and 30 s. A quarter in 12 s
+    leaves 36 s, and three quarters in 30 s leave 10 s."""
     now = iter([0.0, 1.0, 12.0, 13.0, 30.0])
     lines = Lines("simulating", 2.0, lambda: next(now))
     for done in (0.1, 0.5, 0.6, 1.5):

@@ -11,13 +11,8 @@ from mbref import rotations
 from mbref.formats import ImportOptions
 from mbref.scene import GROUND, SceneError
 
-NAMES = {
-    "revolute": "revolute",
-    "spherical": "ball",
-    "universal": "universal",
-    "translational": "prismatic",
-    "fixed": "fixed",
-}
+NAMES = {kind: kind for kind in ("revolute", "universal", "fixed")}  # of a scene's joints in SDF
+NAMES |= {"spherical": "ball", "translational": "prismatic"}
 ROUNDED = 1e-12  # m: some roundings of frames within 1 m
 
 
