@@ -147,7 +147,7 @@ def test_only_a_driver_of_the_crank_prescribes_the_path_of_a_spatial_slider_cran
 
 @pytest.mark.parametrize("q", CRANK_ANGLES)
 @of_cranks
-def test_derivatives_of_the_path_of_a_spatial_slider_crank_are_differences(line, order, reverse, way, q):
+def test_derivatives_of_a_spatial_slider_cranks_path_equal_finite_differences(line, order, reverse, way, q):
     """Differences of fourth order over h = 1e-4 rad in long doubles are exact to about h⁴ = 1e-16 times the
     fifth derivative; 1e-8 also allows for the steepest path."""
     path, h = spatial_slider_crank(spatial(line, order, reverse, way)), 1e-4

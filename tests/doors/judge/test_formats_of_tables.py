@@ -190,7 +190,7 @@ def test_quaternions_of_random_signs_are_right_at_rounded_times_in_any_format(fo
 
 
 @pytest.mark.parametrize("above", ["", "2026-11-29 10:30\n", "1.5.2 export\n\n"])
-def test_bodies_are_told_apart_by_the_case_of_letters_under_any_lines(above: str, tmp_path: Path) -> None:
+def test_bodies_whose_names_differ_in_case_are_told_apart_below_a_date(above: str, tmp_path: Path) -> None:
     """Bodies `2` and `rod` rest, `Rod` moves by 2 t without joints; a date or version may stand above."""
     speeds, path = {"2": 0.0, "rod": 0.0, "Rod": 2.0}, tmp_path / "run.csv"
     bodies = [body(n, 1.0, [1.0] * 3, (0, 0, 0), velocity=[v, 0, 0]) for n, v in speeds.items()]

@@ -34,7 +34,7 @@ def test_exact_motions_of_a_scene_pass_the_comparison_with_and_without_accelerat
 
 
 def test_a_run_with_missing_samples_is_reported():
-    """The second run has one of the two samples, then none."""
+    """The comparison needs two samples; the second run has one of them, then none."""
     scene = FOUR_BAR
     run = short_run(scene)
     found = gate(scene, [run, short_run(scene, np.zeros(1))])

@@ -63,7 +63,7 @@ DRAWN += [(conditional_mechanism, 2), (conditional_mechanism, 3)]
 
 
 @pytest.mark.parametrize(("make", "seed"), DRAWN)
-def test_random_impacts_of_mbref_balance_by_the_judge(make, seed):
+def test_momentum_and_energy_balance_by_the_judge_in_random_impacts_of_mbref(make, seed):
     """The judge measures from the run alone how far each body's momentum and the energy are out of balance at
     each event, and constraints are violated between the events: BALANCES are at most CLOSE."""
     scene = make(seed)

@@ -65,7 +65,7 @@ def test_reduction_drops_bodies_and_keeps_the_loops_that_a_violation_needs():
 
 
 def test_violation_on_a_random_mechanism_is_printed_with_its_check_and_numbers():
-    """The verdict: on mechanism 0 the error of the engine is 0.5, where 0.001 is allowed."""
+    """A made-up verdict: on random mechanism 0 the engine's error is 0.5, where 0.001 is allowed."""
     tally, failed = Tally(Plan("mujoco", 1)), suite.Verdict("truth", "drawn_0", suite.FAIL, 0.5, 1e-3, "why")
     tally.add({"version": "1.0", "verdicts": [suite.record_of(failed)]})
     said = [str(block) for block in tables(tally)]

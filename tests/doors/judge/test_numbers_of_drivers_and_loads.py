@@ -33,10 +33,8 @@ def machine(seed: int) -> Scene:
     under a gravity of random direction."""
     size = np.random.default_rng(seed).uniform(0.3, 1.0, 12)
     inertia, gravity = 0.1 + size[1], tuple(9.81 * (size[2:5] - 0.6))
-    crank, block = (
-        rod("crank", (0.3, 0, 0), size[0] + 0.5, inertia),
-        rod("block", (1.0, 0, 0), size[5], inertia),
-    )
+    crank = rod("crank", (0.3, 0, 0), size[0] + 0.5, inertia)
+    block = rod("block", (1.0, 0, 0), size[5], inertia)
     return Scene(
         name="machine",
         gravity=gravity,
@@ -129,9 +127,10 @@ def wound_disc() -> Scene:
     )
 
 
-@pytest.mark.parametrize("times", [(1.0, 2.0, 5.0, 8.0), (8.0,), tuple(np.linspace(0.0, 8.0, 30))])
+@pytest.mark.parametrize("times", [(1.0, 2.0, 5.0, 8.0), (8.0,), tuple(np.linspace(0.0, 8.0, 30))], ids=len)
 def test_angles_of_a_reference_count_full_turns_whatever_samples_are_asked_for(times) -> None:
-    """The angle is 10 sin t rad, the spring's torque its negative, to 1e-10; the energy 50 J, to 1e-9."""
+    """The angle is 10 sin t rad, the spring's torque its negative, to 1e-10; the energy 10² / 2 J, to
+    1e-9."""
     table, angle = crosscheck.reference_table(wound_disc(), times), 10 * np.sin(times)
     assert table["A.angle"] == pytest.approx(angle, abs=1e-10)
     assert table["load(0).torque"] == pytest.approx(-angle, abs=1e-10)
@@ -147,7 +146,7 @@ def torque_of_a(length: float, driven_joints: str) -> float:
 
 @pytest.mark.parametrize("length", [1e-6, 1.0])
 def test_torque_of_one_of_two_drivers_of_one_freedom_is_not_a_number(length):
-    """Drivers at A and D move the parallelogram's one freedom: only the sum of torques is determined."""
+    """Drivers at A and D move one freedom, of links of 1 µm or 1 m: only the sum of torques is determined."""
     assert np.isnan(torque_of_a(length, "AD"))
 
 

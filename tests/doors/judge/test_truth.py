@@ -40,7 +40,8 @@ def test_coupler_of_a_driven_rhombus_moves_on_a_circle_without_turning(scene, st
 
 
 def test_driven_spatial_slider_follows_the_paper_s_formula():
-    """y² = 0.4² - (0.1 cos θ - 0.15)² - (0.1 sin θ)² with θ = 124.8 t (m, rad, s), to 1e-14 m: rounding."""
+    """The rod of 0.4 m leads from the crank's end, 0.1 m (cos θ, sin θ) across y, to the slider's line at
+    0.15 m: y² = 0.4² - (0.1 cos θ - 0.15)² - (0.1 sin θ)² with θ = 124.8 t (m, rad, s), to 1e-14 m."""
     scene = SCENES["spatial_slider_crank_driven"]()
     t = np.linspace(0, 0.2, 57)
     angle = 124.8 * t

@@ -204,7 +204,7 @@ def test_momentum_drift_of_a_pushed_body_is_the_change_of_its_momentum():
     assert off[6] == pytest.approx(0.9 / math.hypot(3.0, 0.9)) and np.delete(off, 6).max() < ROUNDING
 
 
-@pytest.mark.parametrize("make", [double_hinge, CRANK])
+@pytest.mark.parametrize("make", [double_hinge, CRANK], ids=["double hinge", "slider-crank"])
 @pytest.mark.parametrize("share", [0.01, 0.2])
 def test_error_and_imbalance_of_reactions_too_large_by_a_share_are_that_share(make, share):
     """True reactions have the error 0 and balance forces and the exact accelerations, to rounding."""
@@ -255,7 +255,7 @@ def by_gate(make, field: str, times: float):
     return gate(scene, [run, replace(run, engine="other", **{name: off})])
 
 
-@pytest.mark.parametrize("make", [double_hinge, MOTIONS["planet with armatures"]])
+@pytest.mark.parametrize("make", [double_hinge, MOTIONS["planet with armatures"]], ids=["hinges", "planet"])
 @pytest.mark.parametrize("field", START)
 def test_gate_names_the_field_that_differs_and_twice_the_difference_has_twice_the_size(make, field):
     """A vector is added to one array of the true run of the last body, at the start or the next sample."""
