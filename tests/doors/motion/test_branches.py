@@ -132,19 +132,19 @@ def test_crossings_are_none_without_detection_and_empty_if_no_position_is_passed
     assert simulate(slider_crank(0.1, 0.3, 0.3, "crank"), "taylor", [0.1]).crossings == ()
 
 
-def test_open_reactions_count_redundant_rows_and_one_more_at_a_singular_position():
-    """A component of a reaction is open if equilibrium does not determine it. The driven rhombus has 19 rows
-    of rank 18: one redundant row, in which all four joints take part, opens one component each. At its flat
-    position, the second sample, one more row depends on the others and opens one more, also the driver's
-    torque; 10 µs later it does not."""
+def test_undetermined_reactions_are_counted_and_one_more_at_a_singular_position():
+    """``open_reactions`` counts the components of a reaction that equilibrium does not determine. The driven
+    rhombus has 19 rows of rank 18: one redundant row, in which all four joints take part, leaves one
+    component of each open. At its flat position, the second sample, one more row depends on the others and
+    leaves one more open, also the driver's torque; 10 µs later it does not."""
     flat = simulate(four_bar(), "taylor", [0.05]).crossings[0].time
     run = simulate(four_bar(), "taylor", [0.001, flat, flat + 1e-5])
     found = {part: tuple(row) for part, row in run.open_reactions.items()}
     assert found == {**dict.fromkeys("ABCD", (1, 2, 1)), "driver(A)": (0, 1, 0)}
 
 
-def test_counts_of_open_reactions_are_read_back_from_a_record_file(tmp_path):
-    """The driven rhombus has one redundant row in its four joints: a count of 1 at each sample."""
+def test_counts_of_undetermined_reactions_are_read_back_from_a_record_file(tmp_path):
+    """Equilibrium leaves one component in each of the driven rhombus's four joints open, at each sample."""
     simulate(four_bar(), "taylor", [0.001, 0.002]).save(tmp_path / "run.json")
     read = Motion.load(tmp_path / "run.json")
     assert read.joint("A").open.tolist() == read.columns()["D.open"].tolist() == [1, 1]
@@ -152,7 +152,7 @@ def test_counts_of_open_reactions_are_read_back_from_a_record_file(tmp_path):
 
 def test_diagnosis_calls_a_straight_arch_shaky():
     """Shaky: the constraints at first order allow a velocity of the arch, those at second order forbid it. A
-    pendulum beside it moves, so that there is a motion to diagnose; alone it is not shaky."""
+    pendulum beside it moves, so that there is a motion to diagnose; the pendulum alone is not shaky."""
     bob, pin = rod("bob", (3.5, 0.0, 0.0), 1.0, 0.1), hinge("D", ("ground", "bob"), (3.0, 0.0, 0.0))
     arch = linkage("arch", [(-1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], (1.0, 1.0))
     beside = arch.with_(body=(*arch.body, bob), joint=(*arch.joint, pin))

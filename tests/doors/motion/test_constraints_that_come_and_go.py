@@ -196,6 +196,7 @@ TURNED = [{"joint": "A", "polynomial": [0.0, 1.0]}]  # a driver of the pivot
 
 
 def test_driver_of_a_joint_with_intervals_is_refused_by_name():
+    """The pivot A lets go after 1 s, from when on its driver would have no joint to turn."""
     says = r"driver\[A\].joint: needs a joint that always holds; 'A' has intervals"
     with pytest.raises(SceneError, match=says):
         pendulum(1.0, driver=TURNED)

@@ -75,8 +75,7 @@ def test_report_of_a_start_names_corrections_of_more_than_a_billionth():
 @pytest.mark.parametrize("name", [n for n in SCENES if n != "four_bar_straight"])
 def test_positions_that_are_off_by_millimetres_are_corrected_by_centimetres_at_most(name):
     """Coordinates are moved at random by 1 mm or 1 mrad (standard deviation), which violates constraints by
-    more than 1e-5. Newton's method leaves |Φ| < 1e-10, and moves no coordinate by more than 20 standard
-    deviations, 0.02 m or rad."""
+    more than 1e-5. Newton's method leaves |Φ| < 1e-10, and moves no coordinate by more than 0.02 m or rad."""
     model = Model(SCENES[name]())
     rng = np.random.default_rng(5)
     perturbed = displaced(model.start(), 1e-3 * rng.normal(size=model.n))

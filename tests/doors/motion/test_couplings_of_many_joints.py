@@ -58,7 +58,7 @@ def accelerations(masses, forces, ratios):
 
 @pytest.mark.parametrize("method", ["taylor", "alf-dual+projection/dop853", "lm1+none"])
 @pytest.mark.parametrize("name", CASES)
-def test_coordinates_of_a_sum_move_by_their_closed_form(name, method):
+def test_coordinates_that_a_coupling_sums_move_by_their_closed_form(name, method):
     """Coordinates are q̈ t² / 2, and the reactions along them are the forces of the coupling, both by
     ``accelerations``. Forces and closures are exact to 1e-9, 1000 times rtol."""
     make, masses, forces, ratios = CASES[name]
@@ -146,12 +146,13 @@ def test_engine_that_sums_coordinates_moves_a_differential_by_its_closed_form(na
 
 @pytest.mark.parametrize("name", ["mujoco", "exudyn", "pinocchio"])
 def test_engine_that_couples_pairs_refuses_a_sum_by_name(name):
+    """The gears relate three angles; these engines couple two coordinates at most."""
     refusal = engine(name).supports.missing(differential())
     assert "coupling 'gears' sums 3 coordinates" in str(refusal)
 
 
 def test_sum_is_left_out_of_exported_mjcf_with_a_note(tmp_path, capsys):
-    """A coupling of two joints stays."""
+    """MJCF's equalities relate two joints: of two couplings the pair stays."""
     pair = {"name": "pair", "joints": ["A", "B"], "ratio": 2.0}
     differential(coupling=[*differential().to_dict()["coupling"], pair]).save(tmp_path / "scene.toml")
     assert main(["export", str(tmp_path / "scene.toml"), "--out", str(tmp_path / "scene.xml")]) == 0
@@ -175,6 +176,7 @@ def test_sum_is_left_out_of_exported_mjcf_with_a_note(tmp_path, capsys):
     ],
 )
 def test_fault_of_a_sum_is_named_by_its_field(change, fault):
+    """Fields of the differential's coupling, which sums three angles, are changed; None removes one."""
     entry = {"name": "gears", "joints": ["A", "B", "C"], "ratios": RATIOS.tolist(), **change}
     with pytest.raises(SceneError) as found:
         differential(coupling=[{k: v for k, v in entry.items() if v is not None}])

@@ -18,8 +18,7 @@ MOST_STEPS = 20  # rejected ones included; 7 are taken if rounding in redundant 
 @pytest.mark.parametrize("name", ["bennett", "bricard"])
 def test_linkage_with_redundant_rows_moves_as_the_judge_s_reference_in_under_20_steps(name, method):
     """Bennett's linkage has three redundant rows, Bricard's one. Positions (m) are the reference's to ten
-    rtol, accelerations to 100 rtol of the largest. MOST_STEPS is 20; 7 are taken if rounding in the redundant
-    rows shortens none."""
+    rtol, accelerations to 100 rtol of the largest. Rounding in redundant rows must not shorten steps."""
     scene, times = SCENES[name](), np.linspace(0.0, END, 6)
     run, true = simulate(scene, method, times, Limits(rtol=RTOL)), truth_for(scene).poses(times)
     assert run.outcome.label == "COMPLETED", run.message

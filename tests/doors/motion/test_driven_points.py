@@ -68,7 +68,7 @@ def test_driven_point_out_of_reach_is_a_dead_position_at_its_time():
 
 
 def test_driver_of_a_point_that_contradicts_another_driver_is_named(capsys, tmp_path):
-    """The hinge has a driver at rest."""
+    """The driver of hinge O holds the rod, whose tip the other driver moves."""
     path = str(tmp_path / "rod.toml")
     hanging({"joint": "O"}, tip(polynomial=[0.0, 0.0, 0.3])).save(path)
     assert main(["run", path]) == 2
@@ -77,7 +77,8 @@ def test_driver_of_a_point_that_contradicts_another_driver_is_named(capsys, tmp_
 
 
 def test_driver_of_a_point_is_a_driver_of_a_free_joint(tmp_path, capsys):
-    """A written scene has the joint and equals the scene with the point. MJCF has a hinge only."""
+    """A driven point is short for a driver of a joint of type free, which constrains nothing; the scene has
+    it, also after it was saved and read. MJCF has the hinge alone; its export names the missing driver."""
     scene = hanging(tip(polynomial=[0.0, "20 mm/s"]))
     free = Free(name="tip", bodies=("ground", "rod"), anchor=(0.6, -0.8, 0.0), axis=(1.0, 0.0, 0.0))
     assert scene.joint[-1] == free and scene.driver == (Driver(joint="tip", polynomial=(0.0, 0.02)),)

@@ -44,8 +44,7 @@ def test_generated_code_moves_random_mechanisms_without_springs_as_the_general_k
 @pytest.mark.parametrize("name", ("bricard", "bennett"))
 def test_generated_code_follows_a_motion_that_turns_back(name):
     """Generated code uses the power equation, except at low speed, where the motion turns back: the
-    velocities, projected on their first values, change their sign.
-    General kernels give the same positions."""
+    velocities, projected on their first values, change their sign. General kernels give equal positions."""
     times, rtol = np.linspace(0.0, 4.0, 41), 1e-11
     generic, own = (
         simulate(SCENES[name](), "taylor", times, Limits(rtol=rtol, code=code))

@@ -169,7 +169,7 @@ def test_catch_takes_the_door_at_its_stop_and_lets_go_by_its_force(door_motion):
 
 @pytest.mark.parametrize(("t", "later"), [(0.1, 2), (0.25, 1), (1.8, 0)])
 def test_scene_at_carries_whether_the_catch_holds(door_motion, t, later):
-    """Before it closes, closed, and opened: the run from there has the later events and the last pose."""
+    """Before it closes, closed, and opened: a run from there has the events left and the last pose."""
     rest = mbref.simulate(door_motion.scene_at(t), "taylor", times=[0.0, 2.0 - t], rtol=1e-13)
     assert len(rest.events) == later
     assert np.abs(rest.position[-1] - door_motion.position[-1]).max() <= ROUNDED

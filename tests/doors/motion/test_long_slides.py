@@ -26,9 +26,7 @@ def beads(joints: list[Entry], length: float) -> Scene:
         *joints,
     ]
     driver = [{"joint": "A", "polynomial": (0.0, SPEED)}]
-    return Scene(name="beads", duration=END, body=bodies, joint=joints, driver=driver).with_(
-        gravity=(0, 0, 0)
-    )
+    return Scene(name="beads", duration=END, gravity=(0, 0, 0), body=bodies, joint=joints, driver=driver)
 
 
 def open_tree(length: float) -> Scene:

@@ -51,8 +51,8 @@ def test_matrices_of_random_mechanisms_have_the_judges_accelerations(seed):
 )
 def test_jacobian_and_right_hand_sides_are_differences_of_the_constraints(name):
     """Columns of Φ_q = ∂Φ/∂q are differences of Φ. As d/dt (Φ_q v - ν) = Φ_q q̈ - γ, it is -γ along a motion
-    of constant velocities v, q̈ = 0. The random state violates the constraints. Φ_q agrees to CLOSE, γ with a
-    digit less."""
+    of constant velocities v. The random state violates the constraints. Φ_q agrees to CLOSE, γ to ten
+    CLOSE."""
     scene = MOTIONS[name]()
     rng, start = np.random.default_rng(5), mbref.terms(scene)
     n = len(start.columns)
@@ -190,5 +190,6 @@ def test_own_functions_of_wrong_shape_or_wrong_combination_are_refused(faulty, s
 
 
 def test_state_of_matrices_with_a_wrong_shape_is_refused_with_the_right_one():
+    """The pendulum has one body: a position and a quaternion, seven coordinates. Six are given."""
     with pytest.raises(mbref.InputError, match=r"state: must be finite coordinates \(7,\)"):
         mbref.terms("point_pendulum", state=(np.zeros(6), np.zeros(6)))

@@ -66,8 +66,9 @@ def test_every_formulation_has_the_judges_states_with_the_rows_that_it_claims_to
 
 @pytest.mark.parametrize("name", REDUNDANT)
 @pytest.mark.parametrize("formulation", [n for n in GENERAL if not FORMULATIONS[n].handles_redundancy])
-def test_formulation_without_the_claim_ends_at_the_start_with_the_number_of_redundant_rows(formulation, name):
-    """The leading matrix is singular: the run has no sample, and its message names the cause."""
+def test_formulation_that_claims_no_redundancy_ends_at_once_with_the_redundant_rows(formulation, name):
+    """Without the claim `handles_redundancy` the leading matrix is singular: the run has no sample, and its
+    message has the number of redundant rows (REDUNDANT)."""
     scene = MOTIONS[name]()
     run = mbref.simulate(scene, f"{formulation}+projection", times=times_of(scene))
     assert run.outcome is Outcome.SINGULAR_MATRIX

@@ -82,8 +82,7 @@ FAULTS = {"t_end": "soon", "angles": {"A": [0.0]}, "cost": {"steps": "3"}, "bodi
 
 @pytest.mark.parametrize("field", [None, *FAULTS])
 def test_file_that_is_no_saved_motion_is_refused(field, crank, tmp_path):
-    """The file has no record (None), or a record in which one field has a value of another kind or length
-    (FAULTS)."""
+    """The file has no record (None), or a field of another kind or length in its record (FAULTS)."""
     whole = {"scene": crank.mechanism.to_dict(), "record": {**crank.to_record(), field: FAULTS.get(field)}}
     (tmp_path / "other.json").write_text(json.dumps(whole if field else {"scene": 1}))
     with pytest.raises(ValueError, match=r"other\.json: is not a file that Motion\.save wrote"):

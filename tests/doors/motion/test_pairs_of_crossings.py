@@ -23,7 +23,7 @@ def angles(run) -> np.ndarray:
 def test_flat_positions_of_two_loops_within_one_step_are_both_recorded(apart, method, rtol):
     """Each loop is flat where the crank is in line with the loop's frame. The crank swings down from 0.3 rad
     to π - 0.3 rad and back. It passes 0, where the first loop is flat, and ``apart`` (rad), the angle of the
-    second loop's frame; half a turn later it passes both again. Angles agree to POSITION, 1e-9 rad."""
+    second loop's frame; half a turn later it passes both again, and ``angles`` has the other sign."""
     run = simulate(two_rhombi(apart), method, [1.0], Limits(rtol=rtol, code="generic"))
     assert run.outcome.label == "COMPLETED", run.message
     expected = sorted((0.0, apart), reverse=True) + sorted((0.0, -apart))

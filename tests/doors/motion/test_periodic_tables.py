@@ -86,9 +86,9 @@ def test_run_notes_the_error_of_interpolation_and_proposes_a_periodic_table(peri
 
 
 @pytest.mark.parametrize("duration", [0.3, 2.5])
-def test_number_of_a_periodic_table_changes_in_all_periods(duration, tmp_path):
-    """The angle of the driven wheel at 2.3 s by the value of the row at 0.4 s is the periodic spline through
-    one there and zeros, also of a scene whose rows were repeated and saved."""
+def test_sensitivity_to_a_row_of_a_periodic_table_counts_all_its_periods(duration, tmp_path):
+    """The derivative of the driven wheel's angle at 2.3 s by the value of the row at 0.4 s is the periodic
+    spline that is 1 in this row and 0 in others, also of a scene whose rows were repeated and saved."""
     driven(duration).save(tmp_path / "wheel.toml")
     found = mbref.sensitivities(tmp_path / "wheel.toml", ["J.angle"], ["driver[J].table[3][1]"], [2.3])
     unit = CubicSpline(TIMES, np.eye(len(TIMES))[3], bc_type="periodic")
@@ -96,7 +96,8 @@ def test_number_of_a_periodic_table_changes_in_all_periods(duration, tmp_path):
 
 
 def test_another_table_in_place_of_a_repeated_one_has_a_period_of_its_own():
-    """The new period of 1.6 s contains the old one and its negative."""
+    """The new period of 1.6 s has the old rows, -0.6 rad at 0.4 s, and then their negatives: 0.6 rad at 1.2
+    s. At 2 s, 0.4 s after the period, -0.6 rad is back."""
     table = [*TABLE[:-1], *((t + PERIOD, -x) for t, x in TABLE)]
     scene = driven().with_("driver[J].table", table)
     assert mbref.simulate(scene, times=[1.2, 2.0]).joint("J").angle == pytest.approx([0.6, -0.6], abs=1e-12)
@@ -111,12 +112,13 @@ def test_another_table_in_place_of_a_repeated_one_has_a_period_of_its_own():
     ],
 )
 def test_periodic_table_that_does_not_close_or_cover_the_motion_is_refused(table, says):
+    """The last value is not the first, the first row is after 0 s, or 2 s have 2 s / 0.8 µs periods."""
     with pytest.raises(SceneError, match=says):
         wheel().with_(driver=({"joint": "J", "table": table, "periodic": True},))
 
 
 def test_row_of_a_repeated_table_that_was_edited_in_one_period_is_refused():
-    """A file that mbref wrote has the rows of all periods."""
+    """A file that mbref wrote has the six rows of each period: rows 3 and 9 are one row, of two periods."""
     found = driven().to_dict()
     found["driver"][0]["table"][9][1] = 0.7
     with pytest.raises(SceneError, match="period_rows: is 6, but rows 3 and 9 of the table differ"):

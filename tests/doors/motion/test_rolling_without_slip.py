@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 import mbref
 from crosscheck.engine import BUILT_IN, ON_REQUEST, OPTIONAL, engine
@@ -85,11 +86,13 @@ def wobbling():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_leaning_disc_of_the_example_rolls_on_its_circle_by_every_method(method):
-    """By Newton and Euler, for a lean of cos⁻¹ 0.28 and the spin of the file, Ω = 2.5 rad/s."""
+    """By Newton and Euler, a thin disc whose axis has the cosine c and sine s from the vertical turns
+    steadily at Ω if its centre is on a circle of the radius ρ = c (g - r Ω² s / 4) / (3/2 Ω² s)."""
     motion = mbref.simulate(EXAMPLE, method, times=[0.0, 0.5, 1.0], rtol=1e-10)
     assert motion.outcome is Outcome.COMPLETED, motion.message
-    turned = 2.5 * motion.times
-    circle = [0.2982 * np.cos(turned) - 0.3402, 0.2982 * np.sin(turned), 0.144 + 0 * turned]
+    r, c, s, rate = 0.15, 0.28, 0.96, 2.5  # m and rad/s; values of the file
+    path, turned = c * (G - r * rate**2 * s / 4) / (1.5 * rate**2 * s), rate * motion.times
+    circle = [path * (np.cos(turned) - 1) - r * c, path * np.sin(turned), r * s + 0 * turned]
     assert np.abs(motion.position[:, 0] - np.transpose(circle)).max() < 1e-9
 
 
@@ -106,9 +109,10 @@ def test_upright_disc_falls_or_oscillates_as_routh_says(spin):
     assert lean == pytest.approx(middle + (TINY - middle) * swing, rel=1e-6)
 
 
-@pytest.mark.parametrize("share", [0.5, 0.4, 1.0])
+@pytest.mark.parametrize("share", [0.5, 0.4, 1.0], ids=["disc", "ball", "hoop"])
 def test_wheel_rolls_down_an_incline(share):
-    """x = ½ g sin α t² / (1 + I / m R²) for a disc, a ball and a hoop, and friction accelerates the spin."""
+    """With I = share · m R² about its axis, the wheel rolls by x = ½ g sin α t² / (1 + share), and the
+    friction -m g sin α share / (1 + share) accelerates its spin."""
     wheel = {"name": "wheel", "mass": MASS, "inertia": [share * MASS * R**2] * 3, "position": TOP}
     pull = (G * np.sin(0.4), 0.0, -G * np.cos(0.4))
     scene = Scene(name="slope", gravity=pull, body=[wheel], joint=[tread("slope", "ground", "wheel", TOP)])
@@ -243,12 +247,14 @@ def test_motion_does_not_depend_on_frame_units_and_start(wobbling, change):
     assert np.abs(motion.position[:, 0] - expected).max() < 1e-9 * size
 
 
-def test_run_ends_where_a_wheel_lies_flat_or_drivers_force_it_to_slip():
-    """A disc that falls without spin lies flat after the time of an inverted pendulum; a driver of the axle
-    that turns faster than the hub moves lets the wheel slip."""
+def test_run_ends_where_a_wheel_lies_flat_has_to_slip_or_is_at_a_singular_position():
+    """A disc at rest at θ = 1.2 rad falls by (A + m R²) θ'² / 2 = m g R (sin 1.2 - sin θ) until it is flat. A
+    driver turns an axle faster than another one moves its hub. A crank and a rod in line push a hub."""
     motion = mbref.simulate(disc(1.2, np.zeros(3)), times=[0.0, 0.4, 1.0])
     assert motion.outcome is not Outcome.COMPLETED and len(motion.times) == 2
-    assert "the wheel of joint 'floor' lies flat on its plane, at t = 0.42" in motion.message
+    pace = np.sqrt(2 * MASS * G * R / (ACROSS + MASS * R**2))  # 1/s
+    fall, _ = quad(lambda lean: 1 / (pace * np.sqrt(np.sin(1.2) - np.sin(lean))), 0.0, 1.2)
+    assert f"the wheel of joint 'floor' lies flat on its plane, at t = {fall:.6g} s" in motion.message
     drivers = [
         {"joint": "track", "polynomial": [0.0, 0.3]},
         {"joint": "axle", "polynomial": [0.0, 1.0, 0.0, 0.2]},
@@ -273,8 +279,8 @@ def test_run_ends_where_a_wheel_lies_flat_or_drivers_force_it_to_slip():
     )
 
 
-def test_what_wheels_cannot_have_is_refused_with_the_joint():
-    """Velocities that slip; a wheel that lies flat; a series; features whose constraints have positions."""
+def test_slip_flat_wheels_and_requests_that_need_positions_are_refused_with_the_joint():
+    """Given velocities slip, a wheel lies flat, or a method or function needs constraints of positions."""
     slipping = trolley(speed=0.5).to_dict()
     slipping["body"][1]["angular_velocity"] = [0.0, 9.0, 0.0]
     with pytest.raises(SceneError, match=r"joint\[.*\]: velocities given to bodies violate it"):

@@ -41,7 +41,7 @@ def test_floors_of_a_lattice_are_pendulums_on_pendulums(method):
         return [*speed, *np.linalg.solve(mass * np.cos(apart), torque)]
 
     bodies, _ = motion_of(f"lattice[{columns},{floors}]", method, end)
-    lean = np.array([0.3 * (-1) ** k + 0.05 * k / floors for k in range(floors)])
+    lean = np.array([0.3 * (-1) ** k + 0.05 * k / floors for k in range(floors)])  # rad, at the start
     angles = solve_ivp(rate, (0.0, end), [*lean, *np.zeros(floors)], **EXACT).y[:floors, -1]
     foot = np.zeros(2)
     for floor, angle in enumerate(angles):

@@ -215,8 +215,7 @@ def test_slider_crank_with_a_longer_rod_keeps_its_branch_past_the_upright_crank(
 
 @pytest.mark.parametrize(("gap", "passed"), [(2e-15, 1), (3e-14, 0)])
 def test_only_a_gap_of_the_size_of_rounding_counts_as_a_crossing(gap, passed):
-    """The rod is longer than the crank by the gap (m). Lengths of 0.308 m have a rounding of 3e-17 m, and
-    poses of about 1e-15 m."""
+    """The rod is longer than the crank by the gap (m). Rounding of a length is 3e-17 m, of a pose 1e-15 m."""
     scene = slider_crank(0.308, 0.308 + gap, 0.3, "gap", rate=30.0)
     run = simulate(scene, "taylor", [0.25], Limits())
     assert run.outcome.label == "COMPLETED" and len(run.crossings) == passed
@@ -280,11 +279,10 @@ def test_driver_that_turns_back_before_the_flat_position_returns_to_the_start(di
     ids=["driven", "swinging", "swinging from higher"],
 )
 def test_accelerations_velocities_and_reactions_near_a_crossing_are_exact(scene):
-    """Samples are up to 0.1 rad of the crank before and behind the crossing. The truth are the judge's closed
-    form and its reactions. Errors over the largest value: accelerations ten rtol; velocities 3e-11, rounding
-    over a crossing; reactions 1e-6 if driven. Those of a swing grow as rtol / distance, up to 3e-5 rad from
-    the crossing. Within 1e-7 rad the judge's rank leaves reactions open: they are the sample before, to
-    1e-5."""
+    """Samples are up to 0.1 rad of the crank from the crossing. The truth are the judge's closed form and its
+    reactions. Errors over the largest value: accelerations ten rtol; velocities 3e-11, rounding over a
+    crossing; reactions 1e-6 if driven. Those of a swing grow as rtol / distance, up to 3e-5 rad from the
+    crossing. Within 1e-7 rad the judge's rank leaves reactions open: they are the sample before, to 1e-5."""
     (crossing, *_) = simulate(scene, "taylor", [0.3]).crossings
     rate = np.abs(crossing.angular_velocity[0]).max()
     distances = np.array([1e-1, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6, 1e-9])

@@ -180,7 +180,7 @@ def ratio(crank: float, coupler: float) -> float:
 @pytest.mark.parametrize("rate", [2.0, -5.0])
 def test_spherical_loop_leaves_the_flat_position_on_the_branch_of_its_velocities(rate):
     """In the closed form tan(rocker / 2) is k tan(crank / 2) with the constant k of `ratio`, here to 100
-    rtol. The energy is constant, to 1000 rtol. Its sine of half the angle changes by 0.1."""
+    rtol. The energy is constant, to 1000 rtol."""
     for crank, coupler in ((0.7, 1.1), (1.2, 0.5), (0.9, 1.3)):
         k = ratio(crank, coupler)
         scene = spherical_loop(crank, coupler, 0.0, (rate, k * rate))
