@@ -93,6 +93,7 @@ def test_unwritable_folder_is_reported_once(tmp_path: Path, capsys):
 
 
 def test_folder_in_place_of_a_file_is_reported(tmp_path: Path, capsys):
+    """A folder has the path of a file of the cache: None is read, and the reason is printed."""
     (tmp_path / "a").mkdir()
     assert checked_file.read(tmp_path / "a") is None
     assert "cannot be read (Is a directory)" in capsys.readouterr().err

@@ -9,8 +9,7 @@ from mbref.taylor.series_memory import CALLED
 def test_every_kernel_that_a_series_calls_is_compiled_before_a_run():
     """A missing kernel would compile while the clock of a run counts. A series calls the entries that the
     modules stepper and branches import, and, by their addresses, CALLED. KERNELS_OF_SERIES, which are
-    prepared, are all of these but ``follow_drivers``: the stepper prepares it if drivers prescribe the
-    motion."""
+    prepared, are all of these but ``follow_drivers``, which the stepper prepares for driven motions."""
     from mbref.taylor import stepper
     from mbref.taylor.crossing import branches
 

@@ -78,8 +78,7 @@ def test_sentence_of_an_estimate_states_the_largest_error_and_when_it_exceeds_rt
     ],
 )
 def test_warning_needs_an_error_above_a_thousand_tolerances_and_a_millionth(rtol, error, warns):
-    """A thousand tolerances are 1e-6, 1e-9 and 1e-2 in the cases; the error of the third is above this, but
-    below a millionth."""
+    """A thousand tolerances are 1e-6, 1e-9 and 1e-2; the third error is above this, but below a millionth."""
     assert bool(estimate(0.0, 0.0, error, 0.0, rtol=rtol).warning) == warns
 
 
@@ -100,8 +99,7 @@ def test_warning_states_the_error_its_time_and_a_tighter_tolerance_with_its_erro
 
 def test_estimate_is_the_true_error_of_an_oscillation(oscillator):
     """Closed form x = 1 + 0.2 cos 10 t; the length of the mechanism is 1.2 m, from the joint to the mass. The
-    estimate is within a thousandth of the true error, which rtol 1e-4 and order 4 make a million times as
-    large as rounding."""
+    estimate is within a thousandth of the true error, which is a million times rounding at order 4."""
     motion = simulate(oscillator, "taylor[order=4]", limits=Limits(rtol=1e-4))
     assert motion.outcome is Outcome.COMPLETED
     true = np.abs(motion["mass"].position[:, 0] - 1 - 0.2 * np.cos(10 * motion.times)) / 1.2

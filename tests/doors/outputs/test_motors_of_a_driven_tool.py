@@ -98,7 +98,8 @@ def demand(t: float) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("motors", [("A", "E"), ("E", "A"), ("A", "P"), ("A", "E", "P")])
 def test_torques_of_the_arm_do_the_virtual_work_that_its_tool_needs(motors):
-    """Jᵀ τ = F with the angles' derivatives J by the tool's place; three motors have the least Σ τ²."""
+    """Jᵀ τ = F with the angles' derivatives J by the tool's place. Three motors for two freedoms have the
+    least Σ τ² and are ``open``: their torques are not determined."""
     found = mbref.inverse_dynamics(moved(), motors).motors
     rows = [("A", "E", "P").index(name) for name in motors]
     exact = np.array([np.linalg.pinv(j[rows].T) @ f for j, f in map(demand, TIMES)])
@@ -293,8 +294,8 @@ def test_motors_that_cannot_cause_the_motion_are_refused(motors, changes, senten
 
 
 def test_command_writes_torques_of_motors_and_says_which_share_the_work(tmp_path, capsys):
-    """Columns of a CSV file have the numbers of Python; JSON, which lacks them, is refused. Hinge A can end
-    the redundancy, in which drivers take no part."""
+    """Columns of a CSV file have the numbers of Python; JSON, which lacks them, is refused. ``exchanges``
+    finds that an inline joint at A ends the redundancy, though the arm has drivers."""
     assert {"A": "inline"} in mbref.exchanges(arm())
     arm().save(tmp_path / "arm.toml")
     run = ["run", str(tmp_path / "arm.toml"), "--samples", "7", "--estimate", "no", "--motors"]

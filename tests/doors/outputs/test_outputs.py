@@ -76,7 +76,7 @@ def test_length_rate_and_force_of_a_spring_follow_from_geometry(sprung):
 
 
 def test_load_of_a_number_that_does_not_exist_is_refused(sprung):
-    """Loads are numbered from 0."""
+    """The scene has the three loads of SPRINGS, which are numbered from 0."""
     with pytest.raises(IndexError, match="no load 3; the scene has 3 loads"):
         sprung.load_at(3)
 
@@ -219,7 +219,7 @@ def test_picture_that_needs_a_missing_library_is_refused_with_the_extra_to_insta
 
 
 def test_tables_of_many_columns_fit_80_characters_and_break_no_number(capsys):
-    """21 numbers of the coupler and the energy, over three times; each table begins with the time."""
+    """19 numbers of the coupler and the energy, at three times; each table begins with the time."""
     columns = ("coupler", "energy")
     words = ("--duration", "0.02", "--samples", "3", "--columns", *columns)
     assert main(["run", "four_bar_gravity", *words]) == 0

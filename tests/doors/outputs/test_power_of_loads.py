@@ -41,9 +41,8 @@ def test_spring_of_a_slide_stores_half_its_stiffness_times_the_square_of_its_str
     spring = {"type": "slide_spring", "joint": "S", "stiffness": 8.0, "damping": 0.3}
     joint, load = slide("S", "ground", "block", (0.0, 0.0, 0.0)), {**spring, "natural_displacement": -0.5}
     driver = [{"joint": "S", "polynomial": [0.0, 2.0, 1.5]}]
-    motion = simulate(
-        Scene(name="slide", body=[block], joint=[joint], driver=driver, load=[load]), times=TIMES
-    )
+    scene = Scene(name="slide", body=[block], joint=[joint], driver=driver, load=[load])
+    motion = simulate(scene, times=TIMES)
     assert np.allclose(motion.load_at(0).energy, 4.0 * (ANGLE + 0.5) ** 2, rtol=CLOSE)
     assert np.allclose(motion.potential_energy, motion.load_at(0).energy, rtol=CLOSE)
 

@@ -24,9 +24,9 @@ def door() -> Scene:
 
 
 @pytest.mark.parametrize("scene", [door(), find_scene("four_bar").with_(gravity=(1.0, -9.0, 3.0))], ids=str)
-def test_open_reactions_do_not_depend_on_the_order_of_bodies_and_joints(scene):
-    """Equilibrium leaves components of redundant joints open. Of all reactions that balance the bodies, the
-    ones of least norm are unique: both orders of a scene must have them, to rounding."""
+def test_undetermined_reactions_do_not_depend_on_the_order_of_bodies_and_joints(scene):
+    """Equilibrium leaves components of redundant joints open (`open_reactions`). Of all reactions that
+    balance the bodies, those of least norm are unique: both orders of a scene must have them, to rounding."""
     first = simulate(scene, times=TIMES)
     other = simulate(scene.with_(body=scene.body[::-1], joint=scene.joint[::-1]), times=TIMES)
     assert any(opened.any() for opened in first.open_reactions.values())

@@ -142,7 +142,8 @@ def test_torque_is_exact_while_a_weight_bends_a_crank_that_its_rod_covers(offset
 
 
 def test_equilibrium_determines_no_torque_of_a_driver_at_a_singular_position():
-    """The rod of the slider-crank is as long as its crank and lies on it at 0.25 s alone."""
+    """The slider-crank's rod is as long as its crank and lies on it at 0.25 s alone. ``open`` is then 1, not
+    0."""
     scene = find_scene("planar_slider_crank_equal").with_(gravity=(-3.0, -G, 0.0), load=())
     scene = scene.with_(driver=[{"joint": "A", "polynomial": [0.0, 2 * np.pi]}])
     driver = simulate(scene, times=[0.0, 0.24, 0.25, 0.26]).driver("A")
@@ -162,10 +163,10 @@ def test_parallelogram_that_stops_next_to_its_second_flat_position_turns_evenly(
     assert np.abs(motion.driver("A").torque).max() <= 1e-6 * size
 
 
-@pytest.mark.parametrize("times", [[0.0], [0.0, 1e-10], [0.0, 0.01]])
-def test_open_torque_at_a_singular_start_does_not_depend_on_the_samples(times):
-    """A driven rhombus starts flat, where its folded branch begins, so that equilibrium does not determine
-    the torque at t = 0."""
+@pytest.mark.parametrize("times", [[0.0], [0.0, 1e-10], [0.0, 0.01]], ids=str)
+def test_torque_is_undetermined_at_a_singular_start_whatever_the_samples_are(times):
+    """A driven rhombus starts flat, where its folded branch begins: equilibrium does not determine the torque
+    at t = 0 or 1e-10 s (``open`` is 1), but does at 0.01 s."""
     driver = simulate("four_bar_straight", times=times).driver("A")
     assert driver.open[0] == 1
     assert driver.open[-1] == (times[-1] < 1e-6)

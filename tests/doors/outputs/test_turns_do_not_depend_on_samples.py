@@ -69,7 +69,7 @@ def differences(dense: mbref.Motion, method: str, random: np.random.Generator) -
     ("method", "tolerance"),  # relative, and rad
     [("taylor", 1e-6), ("alf-dual", 1e-6), ("mpi-svd+partitioning/rk4[step=5e-4]", 1e-2)],
 )
-@pytest.mark.parametrize("times", [[END], [0.4, 1.3, 2.9], [2.2, END]])
+@pytest.mark.parametrize("times", [[END], [0.4, 1.3, 2.9], [2.2, END]], ids=str)
 def test_angle_of_a_wheel_on_a_spring_counts_full_turns_from_the_start(method, tolerance, times):
     """φ = 40 (1 - cos 2 t) rad, spring torque -12 (φ - 40), energy 12 · 40² / 2, a quaternion of
     cos φ/2 and sin φ/2, at samples that are turns apart. A missed turn is 6.28 rad."""

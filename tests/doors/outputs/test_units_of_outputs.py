@@ -64,6 +64,7 @@ def test_units_that_no_output_can_have_are_refused(motion, units, message, capsy
 
 
 def test_decimal_commas_without_a_spreadsheet_to_write_are_refused(capsys):
+    """Decimal commas are of CSV files; this table would be printed."""
     assert main(["run", "four_bar", "--decimal-comma", "--columns", "energy"]) == 2
     assert "--decimal-comma: needs --out FILE.csv" in capsys.readouterr().err
 

@@ -71,8 +71,7 @@ def printed(scene: Scene, folder: Path, capsys: pytest.CaptureFixture[str]) -> s
 def test_diagnosis_lists_the_three_crossings_of_a_swinging_rhombus():
     """A rhombus is flat, and so singular, where its crank is level. Released at 0.3 rad, the crank swings
     down through 0 to -π, turns back at -π - 0.3 rad and is at -π again within 1 s. The closed form has its
-    height y at the samples, which changes sign three times, and at the times of the crossings, where it is
-    zero."""
+    height y at the samples, which changes sign three times, and at the crossings, where it is zero."""
     scene = four_bar_gravity(0.3)
     crossings, exact = mbref.along_motion(scene).crossings, closed_form(scene)
     assert [each.sentence for each in crossings] == ["2 branches"] * 3

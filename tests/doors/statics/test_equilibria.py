@@ -162,7 +162,7 @@ def test_modes_without_the_driver_of_a_pendulum_are_its_free_vibration(tmp_path,
     assert frequency == pytest.approx(np.sqrt(TORQUE / ABOUT_HINGE) / (2 * np.pi), rel=1e-9)
 
 
-def test_joint_without_driver_is_refused_as_undriven(capsys):
+def test_modes_without_the_driver_of_a_joint_that_has_none_are_refused(capsys):
     """`modes --undriven JOINT` takes a driver away; this four-bar has none."""
     assert main(["modes", "four_bar_gravity", "--undriven", "B"]) == 2
     assert "joint 'B' has no driver; driven joints: none" in capsys.readouterr().err
