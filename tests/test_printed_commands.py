@@ -53,14 +53,8 @@ OWN = {  # my.toml of a page, else the template of `mbref new`
     "docs/equilibrium.md": "flyball_governor",
     "docs/outputs.md": "spatial_slider_crank_driven",
 }
-OTHERS = [
-    "docs/methods.md",
-    "docs/records.md",
-    "docs/error-estimate.md",
-    "docs/results/which-engine.md",
-    *OWN,
-    *PARTS,
-]
+OTHERS = [f"docs/{name}.md" for name in ("methods", "records", "error-estimate", "results/which-engine")]
+OTHERS += [*OWN, *PARTS]
 
 
 @pytest.mark.parametrize("page", ["README.md", *map(slow, OTHERS)])

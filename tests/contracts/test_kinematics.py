@@ -8,15 +8,7 @@ import pytest
 
 from crosscheck.judge import constraints
 from mbref import rotations
-from mbref.scene import (
-    Body,
-    Cylindrical,
-    Distance,
-    Driver,
-    Revolute,
-    Scene,
-    SceneError,
-)
+from mbref.scene import Body, Cylindrical, Distance, Driver, Revolute, Scene, SceneError
 from mbref.scenes import SCENES
 from tests.helpers.truth_scenes import CLOSED
 

@@ -7,11 +7,7 @@ from hypothesis import strategies as st
 
 from mbref.formulations import mpi_gs, mpi_qr
 from mbref.kernels.named_memory import allocate, packed
-from mbref.linear_algebra.elimination import (
-    determinant,
-    full_pivot,
-    product_of_pivots,
-)
+from mbref.linear_algebra.elimination import determinant, full_pivot, product_of_pivots
 from mbref.linear_algebra.orthogonal_factorisations import (
     add_pseudo_solution,
     gram_schmidt_solve,

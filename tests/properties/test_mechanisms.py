@@ -41,13 +41,8 @@ def run(scene: Scene, samples: int = 3) -> Trajectory:
 
 def state(motion: Trajectory, k: int) -> tuple[np.ndarray, ...]:
     """Return positions, orientations and both velocities at a sample, without torsion springs."""
-    return (
-        motion.position[k],
-        motion.orientation[k],
-        motion.velocity[k],
-        motion.angular_velocity[k],
-        np.zeros(0),
-    )
+    names = ("position", "orientation", "velocity", "angular_velocity")
+    return *(getattr(motion, name)[k] for name in names), np.zeros(0)
 
 
 @given(mechanisms())

@@ -27,8 +27,8 @@ def one(kind: type):
 
 
 def test_matrix_of_the_first_screen_shows_grades_errors_and_ends():
-    """Errors of the records: MuJoCo tuned 2e-3 at best, by default 0.5; Exudyn ended at 0.6 · 0.02 s; mbref
-    1e-3 / 8² in 40 ms."""
+    """Records: MuJoCo tuned is off by 2e-3, by default 0.5; Exudyn ends at 0.6 · 0.02 s; mbref 1e-3 / 8², 40
+    ms."""
     cells = one(Matrix).cells["spatial_slider_crank"]
     assert [(v.family, v.grade) for v in cells["mujoco"]] == [("tuned", "inaccurate"), ("defaults", "wrong")]
     assert [(v.grade, v.lines) for v in cells["exudyn"]] == [("failed", ["not converged at 0.012 s"])]

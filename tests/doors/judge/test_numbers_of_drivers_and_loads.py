@@ -129,8 +129,7 @@ def wound_disc() -> Scene:
 
 @pytest.mark.parametrize("times", [(1.0, 2.0, 5.0, 8.0), (8.0,), tuple(np.linspace(0.0, 8.0, 30))], ids=len)
 def test_angles_of_a_reference_count_full_turns_whatever_samples_are_asked_for(times) -> None:
-    """The angle is 10 sin t rad, the spring's torque its negative, to 1e-10; the energy 10² / 2 J, to
-    1e-9."""
+    """The angle is 10 sin t rad, the torque its negative, to 1e-10; the energy 10² / 2 J, to 1e-9."""
     table, angle = crosscheck.reference_table(wound_disc(), times), 10 * np.sin(times)
     assert table["A.angle"] == pytest.approx(angle, abs=1e-10)
     assert table["load(0).torque"] == pytest.approx(-angle, abs=1e-10)

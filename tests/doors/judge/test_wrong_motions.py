@@ -143,8 +143,8 @@ def largest_energy(scene: Scene, run: Trajectory) -> float:
 
 @pytest.mark.parametrize("share", [1e-6, 0.03])
 def test_velocities_too_fast_by_a_share_have_that_error_and_kinetic_energies_that_drift(share):
-    """Velocities (1 + s) v obey the joints. The kinetic energy T is too large by ((1 + s)² - 1) T, relative
-    to the largest energy."""
+    """Velocities (1 + s) v obey the joints. The energy T grows by ((1 + s)² - 1) T, over the largest
+    energy."""
     scene, _, exact = exact_of(double_hinge)
     faster = {name: (1 + share) * getattr(exact, name) for name in ("velocity", "angular_velocity")}
     found = measured(double_hinge, **faster)
