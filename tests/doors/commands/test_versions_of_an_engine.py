@@ -60,7 +60,7 @@ def test_changes_beyond_noise_are_named_by_kind(changed: dict[str, Any], kinds: 
 
 
 def test_commands_without_a_result_are_named_for_each_version_and_for_both():
-    """Both versions end their runs, and the older one its suite, too: neither run nor suite is compared."""
+    """`compare` ran out of memory with both versions, `verify` with 1.0 alone: no result is compared."""
     said = {"compare": "`compare` ends without a result: no memory"}
     old = measured("1.0")._replace(documents=[None, None], faults=said | {"verify": "`verify` ends"})
     new = measured("1.1")

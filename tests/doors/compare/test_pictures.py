@@ -1,4 +1,4 @@
-"""Motions for pictures: runs that are repeated, their poses and digits; branches / closed forms."""
+"""Motions for pictures: runs that are repeated, their poses and digits, and branches by closed forms."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Studies: what was run and stored / what a rerun, an interruption, a kill or another executor gives."""
+"""Studies store each run once, also after a rerun, an interruption, a kill, or by another executor."""
 
 import json
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor

@@ -1,4 +1,4 @@
-"""Search for the cheapest setting: models of runs with known cost and error / the setting by hand."""
+"""Search for the cheapest setting, of models of runs with known cost and error, against one by hand."""
 
 from collections.abc import Callable
 from dataclasses import asdict

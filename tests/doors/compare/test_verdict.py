@@ -1,4 +1,4 @@
-"""Verdicts and differences: records of known errors and times / grades, sentences, changes."""
+"""Verdicts on records of known errors and times: grades and sentences, and changes between two sets."""
 
 import io
 import re
@@ -78,7 +78,8 @@ def test_grade_follows_from_the_error_of_a_completed_run(error, expected):
     ("drop", "bound", "is_said"), [(0.0, 0.0, True), (1e-7, 0.0, False), (1e-7, 1e-6, True)]
 )
 def test_verdict_says_where_standing_still_is_right(drop, bound, is_said):
-    """A stone falls freely by h = g t² / 2 of its length, 1 m, less or more than the grades tell."""
+    """A stone of 1 m falls by ``drop`` (m). A run in which it stands still is right if this is at most 1e-8
+    of its length, the limit of a right run, or the bound of the truth's error."""
     stone = STONE.with_(gravity=(0.0, 0.0, -2.0 * drop), duration=1.0)
     known = truth_record(stone, np.array([0.0, 1.0]), 0.0)
     own = Judged(

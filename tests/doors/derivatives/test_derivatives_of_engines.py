@@ -116,7 +116,7 @@ def test_command_fails_if_a_derivative_is_wrong_and_says_on_what_it_depends(loop
 
 
 def test_mbref_is_right_and_an_engine_that_lacks_derivatives_is_refused_as_lacking_them(tmp_path, capsys):
-    """The truth are the judge's, of a body on a pin; `make deep` tests loops. Exudyn has none."""
+    """The judge's derivatives for a body on a pin are the truth; `make deep` has loops. Exudyn has none."""
     scene = pinned()
     scene.with_(joint=scene.joint[:1]).save(tmp_path / "pin.toml")
     assert main(["derivatives", "mbref", "exudyn", str(tmp_path / "pin.toml"), "--json"]) == 0
@@ -143,7 +143,8 @@ def test_command_shows_the_committed_results_or_those_of_another_file(tmp_path, 
 @pytest.mark.slow
 @pytest.mark.skipif(not installed("pinocchio"), reason="needs Pinocchio")
 def test_pinocchio_is_right_about_a_link_of_constant_length_that_its_adapter_makes_a_rod(loop, capsys):
-    """The rod has inertia and does not spin. Six: by q, v and forces, in motion and at rest."""
+    """The rod has inertia about its axis, but does not spin. Six errors are by position, velocity and force,
+    each in motion and at rest."""
     main(["derivatives", "pinocchio", loop, "--json"])
     found = json.loads(capsys.readouterr().out)["rows"]
     judged = [row for row in found if row["truth"] == "judge" and row["function"] == "LOCAL"]
@@ -153,7 +154,7 @@ def test_pinocchio_is_right_about_a_link_of_constant_length_that_its_adapter_mak
 @pytest.mark.slow
 @pytest.mark.skipif(not installed("drake"), reason="needs Drake")
 def test_drakes_terms_are_differentiated_right_also_with_open_loops(loop, capsys):
-    """The truth are the judge's; with open loops, differences of Drake's own accelerations."""
+    """The truth is the judge's, and with open loops differences of the accelerations by Drake's terms."""
     assert main(["derivatives", "drake", loop, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["rows"]
     assert {row["grade"] for row in found} == {"right"}

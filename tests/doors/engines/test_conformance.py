@@ -50,8 +50,8 @@ def test_formulas_of_geared_mechanisms_equal_the_reference(make):
 
 
 def test_verify_fails_an_engine_that_prints_and_rests_where_a_body_falls(capsys):
-    """The engine CHATTER prints, fails to move and refuses no scene, also none without a determined motion.
-    Its times, quaternions and processes are right, so that those checks do not fail."""
+    """The engine CHATTER prints, does not move and refuses no scene, even one whose motion is undetermined:
+    it fails these checks. Its times, quaternions and processes are right."""
     status = main(["verify", f"{FAKES}:CHATTER", "--scene", "free_fall", "--json"])
     record = json.loads(capsys.readouterr().out)
     verdicts = {v["property"]: v["status"] for v in record["verdicts"] if v["scene"] == "free_fall"}

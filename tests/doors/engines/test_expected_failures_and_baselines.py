@@ -119,7 +119,7 @@ def test_a_check_that_passes_in_the_baseline_has_to_run_and_pass(right, status, 
 
 
 def test_a_failure_that_is_not_finite_is_no_worse_than_itself_in_the_baseline(wrong, tmp_path):
-    """JSON has no infinite numbers: the file has null for them."""
+    """JSON has no infinite numbers: the file has null. A failure that the baseline lacks still counts."""
     lost = [replace(failed(wrong)[0], measured=value) for value in (math.inf, math.nan)]
     for verdict in lost:
         before = saved(replace(wrong, verdicts=[verdict]), tmp_path)

@@ -55,7 +55,7 @@ def test_a_body_on_a_wire_through_its_centre_slides_as_on_an_incline():
     ("name", "family", "allowed"), [("mujoco", "projected", 1e-8), ("exudyn", "tuned", 1e-6)]
 )
 def test_engine_moves_an_inline_joint_as_the_reference(scene, name, family, allowed):
-    """At the finest setting of the family; ``allowed`` is the largest error, of the scene's length or rad."""
+    """The family's finest setting; ``allowed`` is the largest error from the truth, of the length or rad."""
     found = engine(name)
     assert found.cannot(scene) is None
     run = found.run(scene, TIMES, found.settings_of(scene, family)[-1])

@@ -50,7 +50,7 @@ def test_shown_mjcf_and_python_set_the_options_of_a_mujoco_run(family, options):
 
 
 def test_family_defaults_of_mujoco_leaves_every_option_as_the_library_has_it():
-    """Options, softness and impedance of MuJoCo's own model with a step of 0.5 ms and the scene's gravity."""
+    """MuJoCo's own model, with a step of 0.5 ms, is the truth of options, softness and impedance."""
     mujoco = pytest.importorskip("mujoco")
     from crosscheck.engines.mujoco.simulation import Simulation
 

@@ -116,7 +116,7 @@ BESIDE = {
 @pytest.mark.parametrize("name", ENGINES)
 @pytest.mark.parametrize("parts", BESIDE.values(), ids=BESIDE)
 def test_engine_moves_a_mechanism_with_drivers_and_joints_side_by_side(name, parts):
-    """Poses are off Gauss's principle by less than LIKE_TRUTH, 1e-5 of the length or rad; refusals skip."""
+    """Errors from the motion of Gauss's principle are below LIKE_TRUTH, 1e-5; refusals are skipped."""
     assert error(name, scene(**parts)) < LIKE_TRUTH
 
 

@@ -107,7 +107,7 @@ def test_variants_with_and_without_crossings_together_equal_single_runs():
 
 
 def test_variants_that_all_cross_singular_positions_are_computed_in_one_batch():
-    """Of six variants five follow the first; masses vary, then also places of centres."""
+    """Five of six variants are in a batch with the first; masses vary, then also places of centres."""
     times = np.linspace(0.0, 0.1, 5)
     mass, centre = Variation("body[coupler].mass", 0.45, 0.55), Variation("body[bar].position[0]", 0.2, 0.3)
     for varied in ([mass], [mass, centre]):
