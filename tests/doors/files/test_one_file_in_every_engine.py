@@ -1,5 +1,6 @@
-"""One file in every engine: its meaning, planted differences by part and kind, verdicts and advice. A machine
-is what a file means or a reader makes of it: bodies, joints, loops and couplings."""
+"""One file in every engine: its meaning, planted differences by part and kind, verdicts and advice. The
+corpus has small files of one feature each. A machine, bodies, joints, loops and couplings, is what a file
+means or a reader makes of it."""
 
 import json
 import re
