@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from numpy import sqrt
+
 from mbref.equations.coordinates import coordinate_rates
 from mbref.kernels.compilation import kernel
 
@@ -28,6 +30,25 @@ def jacobian_by_euler_parameters(q, equations, a):
     for b in range(nb):
         for k in range(3, 7):
             a[m + b, 7 * b + k] = 2.0 * q[7 * b + k]
+
+
+@kernel
+def scale_by_lengths(scene, a, rows, columns):
+    """Scale displacements by the length √(I / m) of each body, and the rows of a (m + nb, 7 nb) to the length
+    1; compute the factors on rows and columns. So the largest pivots do not depend on the unit of length."""
+    for j in range(columns.shape[0]):
+        b = j // 7
+        if j - 7 * b < 3:
+            columns[j] = scene.metric_root[6 * b] / scene.metric_root[6 * b + 3]
+    for i in range(rows.shape[0]):
+        square = 0.0
+        for j in range(columns.shape[0]):
+            a[i, j] *= columns[j]
+            square += a[i, j] * a[i, j]
+        if square > 0.0:
+            rows[i] = 1.0 / sqrt(square)
+            for j in range(columns.shape[0]):
+                a[i, j] *= rows[i]
 
 
 @kernel

@@ -20,24 +20,23 @@ coordinates and independent rates, and all other rates follow from these.
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
-
 from numpy import inf
 
 from mbref.equations.coordinates import coordinate_rates, copy_state
 from mbref.equations.evaluation import assemble_system, evaluate
 from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import ACCEPT, CHANGED, ENTER, NOT_CONVERGED, OK, RATES, SINGULAR_AHEAD
-from mbref.kernels.named_memory import Indices, Matrix, Vector, opener
 from mbref.linear_algebra.elimination import full_pivot, lu_of_chosen, lu_solve
 from mbref.linear_algebra.vectors import copy
 from mbref.stabilisation.base import Stabilisation
 from mbref.stabilisation.euler_parameter_rates import (
     jacobian_by_euler_parameters,
     residual_of_rows,
+    scale_by_lengths,
     second_rates,
     velocities_of_rates,
 )
+from mbref.stabilisation.partition_layout import Options, Scratch, options_of, scratch_of
 from mbref.stabilisation.projection import STUCK
 
 MOST_DEPENDENT_STEPS = 20  # largest number of Newton steps for the dependent coordinates
@@ -47,44 +46,14 @@ BETTER = 1.3
 SINGULAR_DEPENDENT = 1e-13  # pivot of Φ_u (1, or 1/m) below which Φ_u is singular to rounding
 
 
-class Options(NamedTuple):
-    """Relative pivot of Φ_u below which a new partition is chosen."""
-
-    kept: float = 0.6
-
-
-class CoordinatePartition(NamedTuple):
-    """Numbers of dependent coordinates and rates; smallest pivot of Φ_u relative to its largest, at the last
-    state, and its largest value since the partition was chosen."""
-
-    rank: int = 0
-    pivot: float = 0.0
-    largest_pivot: float = 0.0
-    rate_rank: int = 0
-
-
-class Scratch(NamedTuple):
-    """Memory of the Jacobian by Euler parameters, the factor of its dependent columns, and the partition."""
-
-    jacobian: Annotated[Matrix, "m + nb", "7*nb"]  # [Φ_r Φ_p; 0 2pᵀ]
-    dependent: Annotated[Matrix, "7*nb", "7*nb"]  # Φ_u of the active rows, factored
-    residual: Annotated[Vector, "7*nb"]
-    row_order: Annotated[Indices, "m + nb"]  # active rows first
-    column_order: Annotated[Indices, "7*nb"]  # dependent coordinates first
-    exchanges: Annotated[Indices, "7*nb"]  # column exchanges of the factorisation
-    last_row_order: Annotated[Indices, "m + nb"]
-    last_column_order: Annotated[Indices, "7*nb"]
-    # of rates, in scenes with rows between velocities alone
-    dependent_rates: Annotated[Matrix, "rate_columns", "rate_columns"]
-    rate_row_order: Annotated[Indices, "rate_rows"]
-    rate_column_order: Annotated[Indices, "rate_columns"]
-    rate_exchanges: Annotated[Indices, "rate_columns"]
-    last_rate_row_order: Annotated[Indices, "rate_rows"]
-    last_rate_column_order: Annotated[Indices, "rate_columns"]
-    partition: CoordinatePartition
-
-
-options_of, scratch_of = opener(Options), opener(Scratch)
+@kernel
+def partition_jacobian(memory):
+    """Compute the Jacobian at the state of the last evaluation, in scenes with wheels in their own units."""
+    scratch = scratch_of(memory.chart)
+    jacobian_by_euler_parameters(memory.state.coordinates, memory.equations, scratch.jacobian)
+    scratch.row_scale[:], scratch.column_scale[:] = 1.0, 1.0
+    if memory.equations.scene.velocity_rows.shape[0] > 0:
+        scale_by_lengths(memory.equations.scene, scratch.jacobian, scratch.row_scale, scratch.column_scale)
 
 
 @kernel
@@ -92,7 +61,7 @@ def choose_coordinates(memory):
     """Choose the partition at ``memory.state``, the state of the last evaluation."""
     q, scratch, system = memory.state.coordinates, scratch_of(memory.chart), memory.equations.system
     a, velocity_rows = scratch.jacobian, memory.equations.scene.velocity_rows
-    jacobian_by_euler_parameters(q, memory.equations, a)
+    partition_jacobian(memory)
     for row in velocity_rows:
         a[row] = 0.0
     system.counts.factorisations += 1
@@ -111,7 +80,7 @@ def choose_rates(memory):
     """Choose the partition of the rates by all rows, at the state of the last evaluation."""
     scratch, settings = scratch_of(memory.chart), memory.equations.system.settings
     a, rows, columns = scratch.jacobian, scratch.rate_row_order, scratch.rate_column_order
-    jacobian_by_euler_parameters(memory.state.coordinates, memory.equations, a)
+    partition_jacobian(memory)
     memory.equations.system.counts.factorisations += 1
     scratch.partition.rate_rank = full_pivot(
         a, a.shape[0], a.shape[1], rows, columns, settings.rank_tolerance
@@ -156,7 +125,7 @@ def enter(t, y, memory):
 def factorise_dependent(memory):
     """Compute LU factors of Φ_u at the state of the last evaluation; return False if Φ_u is singular."""
     scratch, partition = scratch_of(memory.chart), scratch_of(memory.chart).partition
-    jacobian_by_euler_parameters(memory.state.coordinates, memory.equations, scratch.jacobian)
+    partition_jacobian(memory)
     memory.equations.system.counts.factorisations += 1
     chosen = scratch.row_order, scratch.column_order, partition.rank
     pivot = lu_of_chosen(scratch.jacobian, chosen, scratch.dependent, scratch.exchanges, SINGULAR_DEPENDENT)
@@ -171,7 +140,7 @@ def factorise_rates(memory):
     if memory.equations.scene.velocity_rows.shape[0] == 0:
         return True
     scratch, partition = scratch_of(memory.chart), scratch_of(memory.chart).partition
-    jacobian_by_euler_parameters(memory.state.coordinates, memory.equations, scratch.jacobian)
+    partition_jacobian(memory)
     memory.equations.system.counts.factorisations += 1
     lu, exchanges = scratch.dependent_rates, scratch.rate_exchanges
     chosen = scratch.rate_row_order, scratch.rate_column_order, partition.rate_rank
@@ -216,9 +185,11 @@ def solve_dependent_coordinates(t, y, memory):
             return OK
         before = violation
         system.counts.newton += 1
+        for i in range(rank):
+            b[i] *= scratch.row_scale[scratch.row_order[i]]
         lu_solve(scratch.dependent, rank, scratch.exchanges, b)
         for i in range(rank):
-            state.coordinates[order[i]] -= b[i]
+            state.coordinates[order[i]] -= b[i] * scratch.column_scale[order[i]]
     return NOT_CONVERGED
 
 
@@ -234,12 +205,12 @@ def solve_dependent_rates(y, memory):
     free, first = order.shape[0] - rank, q_rate.shape[0] - scratch.partition.rank
     for i in range(rank):
         row = rows[i]
-        b[i] = nu[row] if row < nu.shape[0] else 0.0
+        b[i] = nu[row] * scratch.row_scale[row] if row < nu.shape[0] else 0.0
         for k in range(free):
-            b[i] -= a[row, order[rank + k]] * y[first + k]
+            b[i] -= a[row, order[rank + k]] * (y[first + k] / scratch.column_scale[order[rank + k]])
     lu_solve(lu, rank, exchanges, b)
     for i in range(rank):
-        q_rate[order[i]] = b[i]
+        q_rate[order[i]] = b[i] * scratch.column_scale[order[i]]
     for k in range(free):
         q_rate[order[rank + k]] = y[first + k]
     velocities_of_rates(memory.state)

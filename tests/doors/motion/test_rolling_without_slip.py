@@ -218,8 +218,11 @@ def test_reaction_has_no_power_and_accelerates_the_disc(wobbling):
         assert np.abs(violation_series(WOBBLING, wobbling, level)).max() < size, level
 
 
-@pytest.mark.parametrize("change", ["turned", "millimetres", "later"])
-def test_motion_does_not_depend_on_frame_units_and_start(wobbling, change):
+@pytest.mark.parametrize(
+    ("change", "method"),
+    [*((each, None) for each in ("turned", "millimetres", "later")), ("millimetres", "lm1+partitioning")],
+)
+def test_motion_does_not_depend_on_frame_units_and_start(wobbling, change, method):
     """The scene turned and moved, in millimetres and tonnes, or from half time on, has the same motion."""
     turn, shift, size, begin = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), 1.0, 0
     (body,), (floor,) = WOBBLING.to_dict()["body"], WOBBLING.to_dict()["joint"]
@@ -242,7 +245,7 @@ def test_motion_does_not_depend_on_frame_units_and_start(wobbling, change):
     scene = Scene(name="other", gravity=gravity, body=[body], joint=[floor])
     if change == "later":
         scene, begin = wobbling.scene_at(0.5), 5
-    motion = mbref.simulate(scene, times=TIMES[begin:] - TIMES[begin], rtol=1e-11)
+    motion = mbref.simulate(scene, method, times=TIMES[begin:] - TIMES[begin], rtol=1e-11)
     expected = rotations.rotate(turn, wobbling.position[begin:, 0] * size) + shift
     assert np.abs(motion.position[:, 0] - expected).max() < 1e-9 * size
 
