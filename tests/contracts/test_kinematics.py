@@ -102,7 +102,7 @@ def hinge(name: str = "A", first: str = "ground", second: str = "b", **parts: An
 
 
 def test_scene_length_is_the_largest_distance_of_anchors_and_centres():
-    """Points (3, 4, 0) and the origin; (3, 4, 0) and (0, 0, -6), √(5² + 6²) apart; centres 7 m apart."""
+    """Points (3, 4, 0) and the origin are 5 m apart; (3, 4, 0) and (0, 0, -6) √(5² + 6²) m; centres 7 m."""
     bar = Distance(name="D", bodies=("ground", "b"), anchors=((0.0, 0.0, -6.0), (3.0, 4.0, 0.0)))
     assert constraints.scene_length(scene(body("b", 3.0, 4.0, 0.0), joint=(hinge(),))) == 5.0
     assert constraints.scene_length(scene(body("b", 3.0, 4.0, 0.0), joint=(bar,))) == math.hypot(5.0, 6.0)

@@ -124,7 +124,7 @@ def test_violation_is_reduced_to_the_parts_that_it_needs():
 
 
 def test_violation_that_needs_all_parts_is_not_reduced():
-    """The check fails for the whole scene only."""
+    """The made-up check fails for the whole scene only: no smaller one has the violation."""
     assert findings.shrunk(HINGED, lambda smaller: False) is HINGED
 
 

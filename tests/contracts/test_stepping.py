@@ -29,7 +29,7 @@ def adaptive(rhs, rtol: float = 1e-9, **options) -> Adaptive:
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-10])
 def test_adaptive_steps_stay_within_ten_tolerances_of_the_cosine(rtol: float) -> None:
-    """x = cos 5 t, in intervals of 0.7, 0.001 and 2.299 s."""
+    """The equation of x = cos 5 t is integrated over 0.7, 0.001 and 2.299 s."""
     stepper, y = adaptive(oscillator, rtol), cosine(0.0)
     for t0, t1 in ((0.0, 0.7), (0.7, 0.701), (0.701, 3.0)):
         y = stepper.advance(y, t0, t1)

@@ -110,8 +110,8 @@ def test_random_scene_has_velocities_that_its_joints_allow(scene):
 
 @given(st.integers(0, 5), st.data())
 def test_random_matrices_have_the_requested_rank_and_spectrum(rank, data):
-    """By NumPy's singular values: of matrices by rank, and of matrices with the singular values 3 and 0.001.
-    Rounding is 1e-12 (absolute), and 1e-9 relative to 0.001."""
+    """NumPy finds the singular values of random matrices: as many as the rank, or 3 and 0.001, which are
+    requested. Rounding is 1e-12 (absolute), and 1e-9 relative to 0.001."""
     matrix = data.draw(matrices(rank=rank))
     assert np.linalg.matrix_rank(matrix, rtol=1e-9) == rank, matrix.shape
     spectrum = (3.0, 1e-3)

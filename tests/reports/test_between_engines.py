@@ -38,8 +38,8 @@ def cells(blocks: list[Block], table: int = 0) -> list[list[str]]:
 
 
 def test_undetermined_components_are_listed_for_each_engine():
-    """The five-bar has redundant rows. The table has, for each engine, the components that they leave
-    undetermined at the middle sample. Some are larger than 1 N, so they are not rounding."""
+    """The five-bar has redundant rows. The second table has, for each engine, the components that they leave
+    to its choice at the middle sample. Some are larger than 1 N, so they are not rounding."""
     group = runs_of("five_bar")
     blocks = reactions.render(group)
     tables = [block for block in blocks if isinstance(block, Table)]
@@ -126,7 +126,8 @@ def test_both_branches_of_the_rhombus_move_side_by_side(parted):
 
 
 def test_branch_that_ended_early_says_so_and_stands_still(parted):
-    """Branch 1 ended (STEP_FAILED) with 40 samples. It has a frame a sample, equal from the 40th on."""
+    """Branch 2 is changed to end (STEP_FAILED) with 40 samples. It has as many frames as branch 1, which are
+    equal from the 40th on."""
     count, (first, second) = 40, sorted(parted.branches, key=lambda r: r["asked"]["options"]["branches"])
     bodies = {n: {k: v[:count] for k, v in body.items()} for n, body in second["bodies"].items()}
     times = second["times"][:count]

@@ -37,7 +37,7 @@ def test_every_cell_of_the_paper_and_two_studies_have_stored_records(records):
 
 
 def test_committed_page_shows_the_figures_of_the_paper_s_numbers():
-    """Kinematic analysis: figures 4, 5, 6 and 8; dynamic analysis: figures 11 to 16."""
+    """The paper's kinematic analysis has figures 4, 5, 6 and 8, its dynamic analysis figures 11 to 16."""
     text = (FOLDER / "report.md").read_text()
     for number in (4, 5, 6, 8, *range(11, 17)):
         assert f"](figures/paper-figure-{number}.svg)" in text, number

@@ -18,7 +18,8 @@ ROOT = Path(__file__).parents[2]
 
 def test_conformance_tables_count_passes_failures_and_refusals(tmp_path):
     """MuJoCo passes `truth` on the door and fails it on the pendulum, refuses the door for `closure`, and
-    `energy` does not apply to it. Exudyn has the pass alone. Engines come in their usual order."""
+    `energy` does not apply to it: one check each. Exudyn has the pass alone. Engines come in their usual
+    order; of a check the table has its planted defects, the passes and who fails."""
     passed = Verdict("truth", "door", "pass", 1e-12, 1e-6)
     others = (
         Verdict("truth", "pendulum", "fail", 2e-3, 1e-6),

@@ -40,7 +40,7 @@ def test_figure_is_not_blank_and_reproducible(name):
 
 
 def test_speed_plot_has_a_mark_for_each_run():
-    """At the recorded error and seconds; three failed runs are beside the plot, 1 and 2 by cause."""
+    """Marks are at recorded errors and seconds; three failed runs are beside the plot, 1 and 2 by cause."""
     group = groups()[0]
     failures = speed.failed(group.runs)
     main, strip = speed.plot(group, failures).axes

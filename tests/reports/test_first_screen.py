@@ -36,7 +36,8 @@ def test_matrix_of_the_first_screen_shows_grades_errors_and_ends():
 
 
 def test_opening_names_the_worst_run_and_who_is_right():
-    """At best mbref is off by 1e-3 / 8², which is more than 1e-8; MuJoCo's defaults are off by 0.5."""
+    """At best mbref is off by 1e-3 / 8², more than a right run's 1e-8, and others by more; MuJoCo's defaults
+    by 0.5."""
     opening = one(Opening)
     assert opening.headline.startswith("No engine is right on every scene"), opening.headline
     assert "MuJoCo, defaults, off by 5.0e-01" in opening.caption, opening.caption
@@ -44,7 +45,7 @@ def test_opening_names_the_worst_run_and_who_is_right():
 
 
 def test_links_of_the_page_lead_to_places_of_the_page_and_every_run_has_a_place(page):
-    """No place's id occurs twice."""
+    """Links are of the form #id; no id occurs twice, and each run and family has one."""
     ids = set(re.findall(r' id="([^"]+)"', page))
     links = set(re.findall(r'href="#([^"]+)"', page))
     assert links <= ids, links - ids

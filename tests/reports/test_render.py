@@ -34,8 +34,8 @@ def written(parts: list[Block], tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 
 def test_page_has_every_heading_figure_table_and_failed_run(written, parts):
-    """Figures are wide pictures, plots are interactive, and one mechanism moves. A failed run has its
-    message, with escaped characters."""
+    """Figures are wide pictures, plots are interactive, and one mechanism moves. Each of the four failed runs
+    of `records` has its message, with escaped characters."""
     page = (written / "index.html").read_text()
     for block in parts:
         if isinstance(block, Heading):

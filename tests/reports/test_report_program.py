@@ -22,7 +22,7 @@ def test_report_on_a_faulty_scene_file_is_refused_with_the_faulty_field(tmp_path
 
 
 def test_report_without_its_packages_says_what_to_install(capsys, monkeypatch):
-    """The seam `find_spec` finds no package, as where the extra `report` is not installed."""
+    """`find_spec` is replaced: it finds no package, as where the extra `report` is not installed."""
     monkeypatch.setattr(program, "find_spec", lambda package: None)
     assert program.main([]) == 2
     assert "pip install 'mbref[report]'" in capsys.readouterr().err

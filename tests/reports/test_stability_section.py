@@ -28,7 +28,7 @@ def record(ladder, difficulty, error, outcome="COMPLETED", engine="mbref", famil
 
 def test_stability_table_counts_right_ended_and_wrong_runs(snapshot):
     """Of mbref, 1e-9 is right, UNDECIDED ended early, and 2e-6 and NaN are wrong; of MuJoCo, 5e-3 is right
-    and 0.5 is wrong, by the limit for other engines."""
+    and 0.5 is wrong, by the limit for other engines. The sentences are those of the snapshot."""
     records = [
         record("gap", 1e-1, 1e-9),
         record("gap", 3e-3, 2e-6),
@@ -46,7 +46,7 @@ def test_stability_table_counts_right_ended_and_wrong_runs(snapshot):
 
 
 def test_sentence_says_if_no_other_method_completes_a_wrong_motion():
-    """Both runs, by taylor and by mpi-svd+none, have an error of 1e-9."""
+    """Both runs, by taylor and by mpi-svd+none, have an error of 1e-9, which is right."""
     records = [record("gap", 1e-1, 1e-9), record("gap", 1e-1, 1e-9, family="mpi-svd+none")]
     sentences = [b.text for b in section.render(records) if isinstance(b, Text)]
     assert sentences[1] == (
@@ -74,8 +74,9 @@ def test_stability_section_is_rendered_from_stored_records_and_names_their_missi
     ],
 )
 def test_stability_cell_shows_correct_digits_or_the_letter_of_the_end(error, outcome, text, red):
-    """Digits are -log10 of the error, rounded down. A completed run of a wrong motion is red on the page and
-    bold in Markdown. The only record is of gap 0.1 m, the first column; the others are empty."""
+    """Digits are -log10 of the error, rounded down; m left its motion, a has a singular matrix. A completed
+    run of a wrong motion is red on the page and bold in Markdown. The only record is of gap 0.1 m, the first
+    column; the others are empty."""
     blocks = section.render([record("gap", 1e-1, error, outcome)])
     (heat,) = [b for b in blocks if isinstance(b, HeatMap)]
     cell, *others = heat.rows["taylor"]

@@ -164,8 +164,8 @@ def test_derivatives_of_a_spatial_slider_cranks_path_equal_finite_differences(li
 
 
 def test_a_weightless_pendulum_turns_at_constant_speed():
-    """Without gravity. The bar's centre is 2 m below the hinge and turns at -3 rad/s: 6 m/s, and 18 m/s²
-    towards the hinge, also after a quarter turn at π/6 s. Limits are some thousand roundings."""
+    """No gravity acts on it. The bar's centre is 2 m below the hinge and turns at -3 rad/s: 6 m/s, and 18
+    m/s² towards the hinge, also after a quarter turn at π/6 s. Limits are some thousand roundings."""
     moving = PENDULUM.with_(body=(body("bar", 0.0, -2.0, 0.5, angular_velocity=(0.0, 0.0, -3.0)),))
     truth = one_dof(moving, parallelogram(moving))
     found = truth.poses(np.array([0.0, math.pi / 6]))
@@ -178,7 +178,7 @@ def test_a_weightless_pendulum_turns_at_constant_speed():
 
 @pytest.mark.parametrize("rate", [-3.0, 3.0])
 def test_angle_of_a_weightless_pendulum_counts_full_turns(rate):
-    """Angle rate · t (rad) and rate (rad/s), at times in no order."""
+    """Without gravity the rate (rad/s) is constant and the angle rate · t, asked for at times in no order."""
     moving = PENDULUM.with_(body=(body("bar", 0.0, -2.0, 0.5, angular_velocity=(0.0, 0.0, rate)),))
     times = np.array([100.0, 0.0, 0.25, 40.0])
     found = one_dof(moving, parallelogram(moving)).coordinate(times)

@@ -43,7 +43,7 @@ def test_work_of_a_moment_across_the_turning_axis_is_its_power_integrated():
 
 
 def test_work_of_a_moment_on_a_free_body_is_its_power_integrated():
-    """Energy minus work of the true motion drifts by the quadrature of the power alone: 1.6e-12 measured."""
+    """Energy minus work is constant up to the quadrature of the true motion's power, 1.6e-12 measured."""
     scene = free(load=(Moment(body="body", moment=(1.0, -2.0, 0.5)),))
     drift = energy_series(scene, truth_for(scene).poses(np.linspace(0, 1, 401))).max()
     assert drift < MARGIN * 1.6e-12, f"energy drifts by {drift}"

@@ -125,7 +125,7 @@ def test_opposite_hinges_measure_is_the_largest_sum_of_both_angles():
 
 
 def test_guided_measure_is_the_distance_off_the_line_or_the_tilt():
-    """The larger of the horizontal distance (m) from the first sample's vertical line and the tilt (rad)."""
+    """The larger counts: the distance (m) from the first sample's vertical line, or the tilt (rad)."""
     guided = measures.guided("far")
     assert guided(SCENE, moved(1, 1, (0.03, 0.04, 7.0)), None) == pytest.approx(0.05)
     tilted = at_rest()

@@ -48,7 +48,7 @@ def test_reactions_that_redundant_hinges_share_are_left_out_and_the_angle_is_jud
 
 
 def test_force_in_kilonewtons_is_right_by_the_unit_in_its_header(tmp_path, capsys):
-    """The closed form over 1000, with the header ``A.force.x [kN]``."""
+    """The table has the closed form over 1000, with the header ``A.force.x [kN]``."""
     spinning_rod().save(tmp_path / "rod.toml")
     table = {n.replace("force.x", "force.x [kN]"): c for n, c in pulls().items()}
     table["A.force.x [kN]"] = table["A.force.x [kN]"] / 1e3

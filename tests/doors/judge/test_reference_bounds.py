@@ -41,7 +41,7 @@ def test_reference_of_a_hard_mechanism_is_within_its_bound_of_thirty_digits(name
 
 
 def test_bound_does_not_fall_after_a_sample_at_which_two_motions_differed():
-    """It is ten times the largest difference so far, and at least 1e-14, what doubles leave open."""
+    """The bound is ten times the largest difference so far, and at least 1e-14, some roundings of doubles."""
     assert bounds(np.array([0.0, 1e-12, 1e-13])) == pytest.approx([1e-14, 1e-11, 1e-11])
 
 

@@ -78,7 +78,7 @@ CLOSED = [name for name in MOTIONS if closed_form(MOTIONS[name]()) is not None]
 
 @pytest.mark.parametrize("name", a_few([name for name in MOTIONS if name not in CLOSED], 9))
 def test_both_formulations_of_a_reference_confirm_each_other_at_every_sample(name):
-    """Natural coordinates and the tree of joints share no equations of motion (``both``)."""
+    """Natural coordinates and a tree of joints share no equations; ``both`` is True where they agree."""
     scene = MOTIONS[name]()
     assert referred(scene, times_of(scene)).both.all()
 

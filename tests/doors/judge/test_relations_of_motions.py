@@ -101,7 +101,7 @@ def test_reactions_that_a_relation_expects_balance_the_changed_mechanism(relatio
 
 
 def test_reactions_on_exchanged_bodies_of_joints_are_opposite():
-    """The relation expects the reaction on the other body of a joint, as the judge computes it by itself."""
+    """The relation expects minus the first reactions; the judge computes them of the changed scene."""
     _, expected, found = changed_motion("swapped", "pendulum with torsion spring")
     assert expected.reactions
     for joint, wrench in expected.reactions.items():

@@ -81,8 +81,8 @@ def test_accelerations_change_by_the_rounding_of_the_file(name):
 
 @pytest.mark.parametrize("name", ["four_bar_gravity", "spatial_slider_crank_gravity"])
 def test_engines_accelerate_a_rounded_mechanism_as_the_judge(name):
-    """Differences times the distance to a singular position, which magnifies them: 1e-11 by rounding, 1e-7 by
-    MuJoCo's soft closures. A file read with 6 digits by one side only would leave 1e-6."""
+    """Errors are magnified near a singular position: times the distance to it, they are below 1e-11 by
+    rounding, and 1e-7 by MuJoCo's soft closures. A file read with 6 digits by one side would leave 1e-6."""
     found = compare(turned(name, 6), ("mujoco", "pinocchio"))
     assert found.errors[PRINCIPLE] < 1e-11 / found.distance
     assert found.errors["pinocchio"] < 1e-11 / found.distance

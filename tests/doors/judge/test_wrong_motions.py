@@ -185,7 +185,7 @@ def test_violation_of_gears_that_slip_is_their_angle_and_its_rate():
 
 @pytest.mark.parametrize("height", [0.005, 0.01])
 def test_energy_drift_of_lifted_blocks_is_their_weight_times_the_height(height):
-    """Both blocks are lifted (m) against gravity at one sample: m g h over the largest energy."""
+    """Both blocks are lifted (m) at one sample: the drift is m g h over the largest energy."""
     scene, _, exact = exact_of(double_hinge)
     place = exact.position.copy()
     place[5] -= height * np.array(GRAVITY) / np.linalg.norm(GRAVITY)

@@ -127,7 +127,7 @@ def test_crossing_read_from_a_record_file_equals_the_saved_one(tmp_path):
 
 
 def test_crossings_are_none_without_detection_and_empty_if_no_position_is_passed():
-    """Partitioning detects none; the series pass none with a crank of 0.1 m and a rod of 0.3 m."""
+    """Partitioning detects none; with a crank of 0.1 m and a rod of 0.3 m there is none to pass."""
     assert simulate(four_bar_gravity(0.3), "mpi-svd+partitioning", [0.1]).crossings is None
     assert simulate(slider_crank(0.1, 0.3, 0.3, "crank"), "taylor", [0.1]).crossings == ()
 

@@ -43,7 +43,7 @@ def tip(along=(1.0, 0.0, 0.0), **law) -> dict:
 )
 @pytest.mark.parametrize("law", LAWS)
 def test_tip_of_a_rod_follows_its_driver_by_the_force_of_lagranges_equation(law, method):
-    """x = cos φ, y = sin φ: φ' = -x'/y, and with the inertia I about the hinge I φ'' = -F y - m g x / 2."""
+    """The tip is at (cos φ, sin φ): φ' = -x'/y, and about the hinge I φ'' = -F y - m g x / 2."""
     fields, values = LAWS[law]
     motion = mbref.simulate(hanging(tip(**fields)), method, TIMES, rtol=1e-12)
     assert motion.outcome.name == "COMPLETED", motion.message

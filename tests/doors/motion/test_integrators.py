@@ -84,13 +84,13 @@ def test_adams_of_a_largest_order_converges_with_one_order_more(error, order):
 
 @pytest.mark.parametrize("order", [0, 2.5, 13])
 def test_order_of_adams_outside_1_to_12_is_refused(order):
-    """Orders below, between and above the whole numbers from 1 to 12."""
+    """Orders are whole numbers from 1 to 12; these are below, between and above them."""
     with pytest.raises(ValueError, match=r"max_order must be 1 to 12"):
         simulate(OSCILLATOR, f"lm1+none/adams[max_order={order}]", [1.0])
 
 
 def test_coefficients_of_dop853_equal_scipy_s_to_the_bit():
-    """A, B and C of the stages, and weights of the error estimates of order 3 and 5."""
+    """SciPy has A, B and C of the stages, and the weights of both error estimates, of order 3 and 5."""
     theirs = scipy.integrate.DOP853
     assert np.array_equal([[*row, *[0.0] * (STAGES - len(row))] for row in A], theirs.A[:STAGES, :STAGES])
     assert np.array_equal((B, C), (theirs.B, theirs.C[:STAGES]))

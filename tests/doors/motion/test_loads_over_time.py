@@ -20,7 +20,7 @@ def run(scene: Scene, method: str, times=TIMES) -> mbref.Motion:
 
 
 def test_acceleration_at_the_time_of_switching_is_the_one_afterwards():
-    """A force of 2 N on 2 kg from 0.5 s to 1.5 s: 0, 1, 1 and 0 m/s² at 0, 0.5, 1 and 1.5 s."""
+    """A force of 2 N acts on 2 kg from 0.5 s to 1.5 s: 0, 1, 1 and 0 m/s² at 0, 0.5, 1 and 1.5 s."""
     rounding = 1e-12  # m/s²
     for method in METHODS:
         motion = run(scenes.pushed(Factor(start=0.5, stop=1.5)), method, [0.0, 0.5, 1.0, 1.5])

@@ -130,7 +130,7 @@ def test_own_formulation_turns_a_gear_pair_by_its_closed_form(formulation, chart
 
 
 def test_projection_holds_the_joints_of_an_own_formulation_to_rounding():
-    """Violations of a gear pair in m and rad."""
+    """The formulation is a pseudo-inverse; violations of a gear pair are in m and rad."""
     own = {"formulation": pseudo_inverse, "stabilisation": "projection"}
     motion = mbref.simulate(gear_pair(), times=[0.5, 1.0], **own)
     assert motion.violation.position.max() < 1e-13  # 500 roundings

@@ -32,8 +32,8 @@ def driven(duration: float = 2.5) -> mbref.Scene:
 @pytest.mark.parametrize("method", ["taylor", "lm1+projection"])
 @pytest.mark.parametrize("duration", [2.5, 0.8, 1.0])
 def test_wheel_turns_by_the_periodic_spline_through_the_rows_of_its_driver(duration, method):
-    """Angles and accelerations of SciPy's spline, also at times beyond the scene's duration. Angles are exact
-    to rounding, accelerations to 1e-9, 1000 times rtol."""
+    """The truth is SciPy's spline, also at times beyond the scene's duration. Angles are exact to rounding,
+    accelerations to 1e-9, 1000 times rtol."""
     motion = mbref.simulate(driven(duration), method, SAMPLES, rtol=1e-12)
     assert motion.joint("J").angle == pytest.approx(EXACT(SAMPLES % PERIOD), abs=1e-12)
     assert motion.angular_acceleration[:, 0, 2] == pytest.approx(EXACT(SAMPLES % PERIOD, 2), abs=1e-9)

@@ -26,7 +26,7 @@ SLENDER = pendulum(body=[ROD])
     ],
 )
 def test_message_of_a_failed_run_names_its_cause_and_a_remedy(scene, method, words):
-    """Causes: redundant rows, a rod without thickness (SLENDER), a flat position, growing violations."""
+    """Causes are redundant rows, a rod without thickness (SLENDER), a flat position, growing violations."""
     run = simulate(scene, method, np.linspace(0.0, 1.5, 7), Limits(rtol=1e-6, most_steps=5_000))
     assert run.outcome.label != "COMPLETED"
     assert re.search("; .*" + words, run.message), run.message

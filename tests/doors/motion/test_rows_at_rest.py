@@ -63,7 +63,7 @@ def test_driver_of_a_welded_joint_ends_the_run_before_it_turns_anything():
 
 @pytest.mark.parametrize("method", (METHOD, "lm2+projection/adams", "taylor"))
 def test_welded_body_stays_and_its_weld_carries_the_weight(method):
-    """A body of 2 kg: 2 · 9.81 N along y, by three methods."""
+    """A body of 2 kg weighs 2 · 9.81 N along y; three methods find this reaction."""
     body = Body(name="b", position=(1, 0, 0), mass=2, inertia=(1, 2, 3))
     weld = Fixed(name="W", bodies=("ground", "b"), anchor=(0, 0, 0))
     scene = Scene(name="welded", gravity=(0, -9.81, 0), joint=(weld,), body=(body,))

@@ -68,6 +68,6 @@ def test_wave_of_a_driver_that_begins_at_zero_to_rounding_is_accepted_at_every_s
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(200))
 def test_random_mechanisms_end_with_equal_outcome_and_message_at_every_size(seed):
-    """In units of length from 1e-6 to 1e6 m, one for each seed."""
+    """Each seed has one of four units of length from 1e-6 to 1e6 m."""
     scene = random_mechanism(seed)
     assert ends(in_other_units(scene, (1e-6, 1e-3, 1e3, 1e6)[seed % 4], 1.0))[0] == ends(scene)[0]

@@ -17,7 +17,7 @@ FINE = Limits(rtol=1e-12)
 
 @pytest.mark.parametrize("form", CLOSED_FORMS, ids=lambda form: form.__name__)
 def test_motion_by_series_is_the_closed_form(form):
-    """Every scene of crosscheck's closed forms; positions (m) and orientations (rad) to 100 rtol."""
+    """CLOSED_FORMS have a scene and its positions (m) and orientations (rad), met to 100 rtol."""
     scene, exact = form()
     times = np.linspace(0.0, scene.duration, 9)
     run = simulate(scene, "taylor", times, FINE)

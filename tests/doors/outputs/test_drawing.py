@@ -153,7 +153,7 @@ def test_animation_of_300_samples_shows_every_third_one():
 
 @pytest.mark.parametrize(("end", "seconds"), [(1.0, 4.0), (7.0, 7.0), (60.0, 12.0)])
 def test_animation_plays_in_real_time_between_four_and_twelve_seconds(end, seconds):
-    """Motions of 1, 7 and 60 s play for 4, 7 and 12 s."""
+    """A motion of 7 s plays for 7 s; one of 1 s is slowed to 4 s, and one of 60 s sped up to 12 s."""
     timeline = Timeline.of(np.array([0.0, end]))
     assert f'dur="{seconds:g}s"' in timeline.animate("x", ["0", "1"])
 

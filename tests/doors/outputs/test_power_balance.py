@@ -47,7 +47,7 @@ def test_work_of_drivers_and_loads_is_the_change_of_energy(seed, method, rtol):
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(100, 340, MANY))
 def test_work_is_the_change_of_energy_of_many_mechanisms(first):
-    """3 of 20 mechanisms may lack a balance: without samples, or with powers too fast for the panels."""
+    """E(t) - E(0) = ∫ Σ P dt; 3 of 20 mechanisms may lack samples, or have powers too fast for the panels."""
     found = {seed: off(run(powered_mechanism(seed))) for seed in range(first, first + MANY)}
     moved = {seed: imbalance for seed, imbalance in found.items() if not np.isnan(imbalance)}
     assert len(moved) >= MANY - WITHOUT_BALANCE, f"balances from {first} on for {list(moved)} only"

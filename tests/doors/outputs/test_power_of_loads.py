@@ -22,7 +22,7 @@ def swung(*load) -> Motion:
 
 
 def test_springs_store_half_their_stiffness_times_the_square_of_their_stretch():
-    """8 N/m (l - 1.5 m)² / 2, l = √(13 - 12 sin φ) m, and 4 N m/rad (φ + 20 rad)² / 2; dampers store none."""
+    """By the law of cosines l = √(13 - 12 sin φ) m; the springs are relaxed at 1.5 m and -20 rad."""
     ends = {"bodies": ["ground", "arm"], "points": [[0.0, 3.0, 0.0], [2.0, 0.0, 0.0]]}
     motion = swung(
         {"type": "spring", **ends, "stiffness": 8.0, "damping": 0.3, "natural_length": 1.5},

@@ -55,7 +55,7 @@ def test_motor_lifts_a_nut_by_its_screw():
 
 
 def test_driver_delivers_what_spring_and_torque_of_its_joint_leave_over():
-    """(J + I) φ'' = M - 5 (φ - 40) - 0.6 φ' + 1.5 for the torque M of the driver."""
+    """The torque M of the driver follows from (J + I) φ'' = M - 5 (φ - 40) - 0.6 φ' + 1.5."""
     loads = [
         {"type": "torsion_spring", "joint": "A", "stiffness": 5.0, "damping": 0.6, "natural_angle": 40.0},
         {"type": "joint_torque", "joint": "A", "torque": 1.5},

@@ -59,7 +59,7 @@ def test_drivers_that_differ_in_rate_or_at_few_times_are_named(other):
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_table_of_13_digits_agrees_with_its_cubic_from_rest(order):
-    """Both are x(t) = 0.3 t² - 0.1 t³ m, in both orders; rates differ by the table's rounding."""
+    """Both drivers move the slide by x(t) = 0.3 t² - 0.1 t³ m; rates differ by the table's rounding."""
 
     def x(t):
         return 0.3 * t**2 - 0.1 * t**3

@@ -1,4 +1,4 @@
-"""Counts of the built-in scenes against those the paper states."""
+"""Counts of the built-in scenes against those that the paper, Neto & Ambrósio (2003), states."""
 
 import numpy as np
 import pytest

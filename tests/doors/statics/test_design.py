@@ -88,7 +88,7 @@ def test_plate_gets_the_lengths_of_its_three_sides():
 
 
 def test_sides_that_violate_the_triangle_inequality_are_refused():
-    """0.5 m > 0.1 m + 0.2 m."""
+    """The crank's three hinges cannot be 0.5, 0.1 and 0.2 m apart: 0.5 m > 0.1 m + 0.2 m."""
     with pytest.raises(SceneError, match=r"body\[crank\]: no link has these lengths"):
         assemble(four_bar_with_flag(), {("A", "B"): 0.5, ("A", "P"): 0.1, ("B", "P"): 0.2})
 

@@ -68,7 +68,7 @@ def test_inverted_pendulum_that_its_spring_just_holds_is_one_indifferent_equilib
 
 @pytest.mark.parametrize("share", [-1e-6, 1e-6])
 def test_inverted_pendulum_is_stable_or_unstable_by_a_millionth_of_its_critical_stiffness(share):
-    """Eigenvalues s² = -(k - m g l) / I with k = m g l (1 + share)."""
+    """Eigenvalues are s² = -(k - m g l) / I with the spring's stiffness k = m g l (1 + share)."""
     each = equilibria(pendulum((0.0, ARM, 0.0), load=[spring(TORQUE * (1 + share))]), starts=1)[0]
     assert each.stability == ("stable" if share > 0 else "unstable")
     # k - m g l is a difference of a millionth: rounding of 1e-12 is relative to it 1e-6, with a margin of 100
@@ -87,7 +87,7 @@ def test_slow_fall_of_a_pendulum_is_found_beside_a_damper_ten_million_times_fast
 
 @pytest.mark.parametrize("stiffness", [1e2, 1e5, 1e9])
 def test_both_equilibria_of_a_pendulum_are_found_beside_springs_of_any_stiffness(stiffness):
-    """At heights of ± l, with √(m g l / I) as the least eigenvalue of both."""
+    """The pendulum rests at heights of ± l, both with √(m g l / I) as the least eigenvalue."""
     found = equilibria(with_slide(stiffness, 0.0, 0.01))
     assert sorted(each.stability for each in found) == ["stable", "unstable"]
     heights = sorted(each.scene.body[0].position[1] for each in found)
@@ -244,7 +244,7 @@ def test_rod_on_a_ball_joint_hangs_and_stands_and_spins_idly():
 
 
 def test_bounds_of_eigenvalues_in_json_are_at_least_their_errors(tmp_path, capsys):
-    """Closed form of a hanging pendulum: ± i √(m g l / I)."""
+    """Eigenvalues of a hanging pendulum are ± i √(m g l / I)."""
     path = str(tmp_path / "pendulum.toml")
     pendulum((0.0, -ARM, 0.0)).save(path)
     assert main(["modes", path, "--starts", "1", "--json"]) == 0

@@ -58,7 +58,7 @@ def test_a_pendulum_on_a_spindle_leaves_the_axis_above_the_critical_rate(rate):
 
 
 def test_hinge_of_a_steady_motion_carries_weight_and_centripetal_force():
-    """At Ω = 6 rad/s and the radius r: m Ω² r towards the axis, and m g, to ACCURACY."""
+    """At Ω = 6 rad/s and the radius r it carries m Ω² r towards the axis, and m g, to ACCURACY."""
     [each] = [e for e in steady(6.0) if e.stability == "stable" and angle(e) > 0]
     radius = each.scene.body[1].position[0]
     assert np.allclose(each.reactions["B"][:3], [-MASS * 36.0 * radius, 0.0, MASS * G], atol=ACCURACY)
