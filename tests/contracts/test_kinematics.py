@@ -123,8 +123,8 @@ def test_scene_length_is_the_largest_distance_of_anchors_and_centres():
     ids=["at rest", "thrown", "falling", "thrown and falling", "slow", "massless at rest", "massless thrown"],
 )
 def test_length_of_a_single_body_is_its_way_or_its_radius_of_gyration(parts, more, length):
-    """The larger of the way v t + g t² / 2 over the duration, of 1 s unless given, and the radius of gyration
-    √(0.5 kg m² / 2 kg) = 0.5 m; the radius counts as 1 m for a body without mass."""
+    """The length is the larger of the way v t + g t² / 2 over the duration, of 1 s unless given, and the
+    radius of gyration √(0.5 kg m² / 2 kg) = 0.5 m, which counts as 1 m for a body without mass."""
     assert constraints.scene_length(scene(body(**parts), **{"duration": 1, **more})) == pytest.approx(length)
 
 

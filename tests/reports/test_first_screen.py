@@ -55,7 +55,7 @@ def test_links_of_the_page_lead_to_places_of_the_page_and_every_run_has_a_place(
 
 
 def test_marks_of_the_speed_figure_have_the_records_errors_and_times():
-    """One mark with its numbers for each completed run; each mark has a title, and so has the figure."""
+    """Each completed run has one mark with its numbers; each mark has a title, and so has the figure."""
     plot = one(Plot)
     marks = re.findall(r'data-error="([^"]+)" data-seconds="([^"]+)"', plot.svg)
     shown = [(f"{r.error:.4g}", f"{r.seconds:.4g}") for r in groups()[0].completed()]

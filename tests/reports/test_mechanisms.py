@@ -42,7 +42,7 @@ def test_compared_runs_are_drawn_with_title_error_and_singular_positions():
 
 
 def test_still_picture_shows_the_largest_difference_of_a_run():
-    """Without animation: the frame at which a body is farthest from the truth."""
+    """Without animation the picture is the frame at which a body is farthest from the truth."""
     true, run = (mechanisms.motion_of(scene(), r) for r in (truths()[0]["motion"], motion()))
     picture = mechanisms.over_truth(scene(), true, run, "mujoco")
     stands = ET.fromstring(picture).findall(f"{SVG}g")[1]

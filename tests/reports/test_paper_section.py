@@ -169,8 +169,8 @@ def test_exponent_of_a_growing_violation_is_the_power_put_in(records, power):
 
 
 def test_tables_show_the_paper_s_and_the_records_ratios_of_steps(blocks):
-    """Steps a second in the paper: 103 of LM2 + CP and 3303 of LM2 (Table III), 1368 and 2428 of ALF + CP and
-    LM1 (IV). Records have 1000 steps each: LM2 + CP to 20 s, LM2 to 2.5 s."""
+    """The paper prints steps a second: 103 of LM2 + CP and 3303 of LM2 (Table III), 1368 and 2428 of ALF + CP
+    and LM1 (IV). Records have 1000 steps each: LM2 + CP to 20 s, LM2 to 2.5 s."""
     third, fourth = tables(blocks, "steps, ratio printed")
     printed = third.header.index("steps, ratio printed")  # the column of our ratio follows
     in_iii, in_iv = ({row[0]: row[printed : printed + 2] for row in t.rows} for t in (third, fourth))

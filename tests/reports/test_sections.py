@@ -118,7 +118,8 @@ def test_convergence_table_shows_the_orders_put_into_the_records():
 
 
 def test_limit_table_shows_the_bias_and_discretisation_put_in():
-    """Errors of a are 1e-4 + 1e-2 h: 1e-5 by h = 1e-3; of b 1e-2 h², with a bias of rounding, below 1e-12."""
+    """At the step h, a is off by 1e-4 + 1e-2 h: 1e-5 is discretisation at 1e-3; b by 1e-2 h², with no
+    bias."""
     soft = [record("a", "soft", 1e-4 + 1e-2 * h, 0.1, step=h) for h in (0.04, 0.02, 0.001)]
     true = [record("b", "true", 1e-2 * h**2, 0.1, step=h) for h in (0.04, 0.02, 0.01)]
     [group] = by_scene([*soft, *true], {scene().name: scene()})

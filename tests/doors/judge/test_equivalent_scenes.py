@@ -66,7 +66,7 @@ def test_driving_moment_that_varies_by_over_1e_6_is_refused(size):
 
 
 def test_drivers_that_a_moment_on_the_ground_cannot_replace_are_refused():
-    """A slide's driver, a hinge between two moving bodies, two drivers, and a run without reactions."""
+    """A slide's driver, one between moving bodies, two drivers and a run without reactions are refused."""
     slide = Translational(name="crank", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=Z)
     turned = CRANK.model_copy(update={"bodies": ("c", "b")})
     for joint in (slide, turned):

@@ -147,7 +147,7 @@ def test_column_states_the_time_at_which_its_error_begins(table):
     ],
 )
 def test_faulty_table_is_refused_with_its_fault(text, columns, says, tmp_path):
-    """800 s, a slip in a name, a missing column, two places, two wrong units: the error names each."""
+    """Faults are times up to 800 s, a slip in a name, a missing column, two places and two wrong units."""
     (tmp_path / "faulty.csv").write_text(text)
     with pytest.raises(SceneError, match=says):
         read(tmp_path / "faulty.csv", SCENE, columns)

@@ -97,7 +97,7 @@ def test_truth_ends_where_a_spring_has_no_length():
 
 
 def test_symmetric_top_precesses_about_its_angular_momentum():
-    """Precession at |L| / I₁ about L, relative spin at ω₃ - L₃ / I₁ about the top's axis, to 1e-13 rad."""
+    """The top precesses at |L| / I₁ about L and spins at ω₃ - L₃ / I₁ about its axis, to 1e-13 rad."""
     body = Body(name="top", mass=1, inertia=(0.2, 0.2, 0.3), position=(0, 0, 0), angular_velocity=(1, 0, 4))
     t = np.linspace(0, 3.0, 40)
     motion = truth_for(Scene(name="top", body=(body,), duration=3.0)).poses(t)

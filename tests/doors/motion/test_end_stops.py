@@ -195,8 +195,8 @@ def vibration(share: float) -> Scene:
 
 @pytest.mark.parametrize("share", [1e-2, 1e-4, 1e-8])
 def test_stop_just_below_the_reach_of_a_vibration_is_met(share):
-    """At asin(1 - share) / 4 s, with the rate cos 4 t, of which half is left. A rounded place changes the
-    time by up to ROUNDED / rate, and the rate by this times 4 m/s², with a margin of four."""
+    """The mass meets the stop at asin(1 - share) / 4 s with the rate cos 4 t, of which e = 0.5 leaves half. A
+    rounded place changes the time by up to ROUNDED / rate, and the rate by this times 4 m/s², margin four."""
     time, rate = np.arcsin(1 - share) / 4, np.sqrt(share * (2 - share))
     (event,) = mbref.simulate(vibration(share), "taylor", times=[0.0, 0.5], rtol=1e-13).events
     assert event.stops == ("S.upper",) and abs(event.time - time) <= ROUNDED / rate

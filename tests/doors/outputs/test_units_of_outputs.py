@@ -55,7 +55,7 @@ def test_columns_in_other_units_times_the_size_of_the_unit_are_the_si_columns(mo
     [("mn", "'mn' is no unit"), ("mm,cm", "'mm' and 'cm' are units of one"), ("kg", "no number of a motion")],
 )
 def test_units_that_no_output_can_have_are_refused(motion, units, message, capsys):
-    """An unknown unit, two units of one quantity, and a unit of mass: by the method and by the command."""
+    """Method and command refuse an unknown unit, two units of one quantity, and a unit of mass."""
     with pytest.raises(mbref.InputError, match=f"units: .*{message}"):
         motion.columns(units=units)
     with pytest.raises(SystemExit, match="2"):

@@ -73,8 +73,7 @@ def test_small_motions_about_the_pin_are_those_of_the_spring(kind):
     ids=["equilibria", "derivatives", "judge"],
 )
 def test_damper_in_the_plane_has_no_direction_at_the_pin_so_that_nothing_is_linear_there(question):
-    """A block that circles about the pin is not damped, one that passes it is: no linear equation has
-    both."""
+    """A block that circles about the pin is not damped, one that passes it is: nothing linear has both."""
     with pytest.raises(SceneError, match=r"load\[0\]: the ends of the (damped )?spring meet"):
         question(tied("plane", DAMPING))
 
