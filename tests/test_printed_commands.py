@@ -73,7 +73,7 @@ def test_printed_commands_of_mbref_end_with_status_0(page, tmp_path):
 
 @pytest.mark.parametrize("page", ["README.md", slow("docs/api.md"), slow("docs/judge.md")])
 def test_printed_python_runs_without_error(page, tmp_path, monkeypatch):
-    """Each block of the page alone, as a reader would paste it."""
+    """Each block of the page runs alone, as a reader would paste it."""
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"^```python\n(.*?)^```$", (ROOT / page).read_text(), re.S | re.M)
     assert blocks
@@ -84,7 +84,7 @@ def test_printed_python_runs_without_error(page, tmp_path, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("words", OF_CROSSCHECK.values(), ids=OF_CROSSCHECK)
 def test_printed_command_of_crosscheck_ends_with_status_0(words, tmp_path):
-    """Each in a folder of its own that has my.toml, robot.xml and the scene files that the command names."""
+    """Each runs in a folder of its own that has my.toml, robot.xml and the scene files that it names."""
     if words[1] == "certify":
         pytest.importorskip("flint")
     run(["mbref", "new", "my.toml"], tmp_path)

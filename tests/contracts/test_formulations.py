@@ -67,7 +67,7 @@ def test_five_iterations_of_a_small_penalty_are_too_few_for_alf_and_enough_for_a
 
 
 def test_accelerations_of_a_long_chain_by_alf_dual_are_exact_to_rounding():
-    """A chain of ten loops against the closed form; its condition may magnify the rounding 1e-16 by 1e4."""
+    """A chain of ten loops has a closed form; its condition may magnify the rounding 1e-16 by 1e4."""
     rounding = 1e-16 * 1e4  # of the largest acceleration
     scene = find_scene("four_bar_chain[10]")
     found = simulate(scene, "alf-dual+none", [0.0]).acceleration

@@ -84,8 +84,8 @@ def test_each_committed_violation_on_a_mechanism_of_the_suite_has_a_cause():
 
 
 def test_page_on_engines_counts_the_violations_of_warp_by_cause():
-    """Warp's stored verdicts: each row of the table has a cause and its number of failed checks. The sentence
-    before the table has the numbers of passed, refused and failed checks."""
+    """The truth are Warp's stored verdicts: each row of the table has a cause and its number of failed
+    checks. The sentence before the table has the numbers of passed, refused and failed checks."""
     [warp] = [v for v in stored.verified(ROOT / "reports" / "reference") if v["engine"] == "warp"]
     failed = [v for v in warp["verdicts"] if v["status"] == "fail"]
     causes = Counter(explained.explanations()["warp", v["property"], v["scene"]].cause for v in failed)

@@ -75,7 +75,7 @@ def test_twelve_curves_of_an_engine_have_one_colour_and_different_lines():
 
 
 def test_powers_of_ten_at_the_axes_are_plain_text():
-    """10⁻⁷ with raised digits, not a formula, so that the text can be found and copied."""
+    """10⁻⁷ is written with raised digits, not as a formula, so that the text can be found and copied."""
     picture, (axes,) = figures.canvas()
     axes.plot([1e-7, 1e-3, 1.0], [2.0, 3.0, 5.0])
     axes.set(xscale="log", yscale="log")

@@ -32,7 +32,7 @@ def test_exact_run_is_drawn_on_the_exact_motion():
 
 
 def test_compared_runs_are_drawn_with_title_error_and_singular_positions():
-    """Two runs with an error of 0.5, side by side, and a singular position at 0.01 s. Titles have the
+    """Two runs with an error of 0.5 are side by side, with a singular position at 0.01 s. Titles have the
     settings step and rtol, and no others such as a margin. No script is needed."""
     shown = Run(record("mujoco", "defaults", 0.5, 0.1, step=0.1, margin=3))
     picture = mechanisms.compared(scene(), exact(scene()), [shown, shown], [0.01])
@@ -55,7 +55,7 @@ def test_still_picture_shows_the_largest_difference_of_a_run():
 
 
 def test_crank_turns_by_less_than_two_thirds_of_a_radian_between_drawn_frames():
-    """A body turns by about 1/3 rad between frames; twice that looks broken. At most 91 frames."""
+    """A body turns by about 1/3 rad between frames; twice that looks broken. At most 91 frames are drawn."""
     planar = SCENES["planar_slider_crank"]().with_(duration=0.05)
     true = mechanisms.motion_of(planar, truth_record(planar, np.linspace(0, 0.05, 3), 20.0)["motion"])
     crank, *_ = bars(mechanisms.over_truth(planar, true, None, ""), BACKGROUND)

@@ -218,7 +218,7 @@ def test_accelerations_of_exact_records_have_all_digits_and_a_failed_start_has_n
 
 
 def test_every_figure_is_drawn_and_curves_over_time_run_forwards(blocks):
-    """Over four panels have an axis of times (s), up to more than 0.01 s: violations would be smaller."""
+    """More than four panels are over the time, which passes 0.01 s; a violation would be smaller."""
     drawn = {block.name: block.draw() for block in blocks if isinstance(block, Figure)}
     for number in (4, 5, 6, 8, 11, 12, 13, 14, 15, 16):
         assert f"paper-figure-{number}" in drawn, f"Figure {number} is missing of {list(drawn)}"

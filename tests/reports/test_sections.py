@@ -154,7 +154,7 @@ def test_least_errors_table_shows_best_settings_and_failures():
     ("shifts", "words"), [((0.0,), "The same mechanism in b"), ((0.0, 1e-4), "different mechanisms")]
 )
 def test_summary_says_if_engines_move_different_mechanisms(shifts, words):
-    """Short motions for the model check: equal to the truth, or one of them 1e-4 m off."""
+    """Short motions of the model check are equal to the truth, or one of them is 1e-4 m off."""
     gate = [at_gate(shift) for shift in shifts]
     [group] = by_scene(records()[:3], {scene().name: scene()}, gate)
     [_, said] = [b.text for b in summary.render([group]) if isinstance(b, Text)]

@@ -74,7 +74,7 @@ def test_sound_engine_passes_the_whole_suite():
 
 
 def test_page_and_data_of_checks_are_what_their_command_writes():
-    """docs/results/conformance.md and the data for reports, by python -m tests.zoo.table."""
+    """python -m tests.zoo.table writes docs/results/conformance.md and the data for reports."""
     path = Path(__file__).parents[2] / "docs" / "results" / "conformance.md"
     assert path.read_text() == page(), "python -m tests.zoo.table docs/results/conformance.md renews it"
     assert FOR_REPORTS.read_text() == data(), "the same command renews it"

@@ -103,9 +103,9 @@ def test_andrews_reference_of_the_test_set_is_wrong_from_the_eleventh_digit():
 
 
 def test_numbers_printed_for_the_four_bar_a02_are_within_4e_6_of_its_closed_form():
-    """Position (m) and velocity (m/s) of the crank's end at 10 s: it is twice as far from the ground's hinge,
-    the origin, as the crank's centre. A finite-element code of second order printed them, whose step of
-    1.25e-4 s leaves errors of some 1e-6; the position is within 1e-6."""
+    """Printed are place (m) and velocity (m/s) of the crank's end at 10 s, twice as far from the ground's
+    hinge, the origin, as the crank's centre. A finite-element code of second order printed them, whose step
+    of 1.25e-4 s leaves errors of some 1e-6; the position is within 1e-6."""
     problem = PUBLISHED["A02"]
     exact = closed_form(find_scene(problem.scene)).poses(np.array([problem.time]))
     place, velocity = 2 * exact.position[0, 0, :2], 2 * exact.velocity[0, 0, :2]

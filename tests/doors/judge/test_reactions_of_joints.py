@@ -34,7 +34,7 @@ def test_table_of_the_closed_form_of_reactions_is_right_in_each_column():
 
 @pytest.mark.parametrize(("scale", "says"), [(-1.0, "factor -1"), (1.01, "factor of 1.01")])
 def test_reactions_times_a_factor_are_off_and_the_factor_is_named(scale, says):
-    """The closed form times -1 or 1.01; zeros times a factor remain right."""
+    """The table is the closed form times -1 or 1.01; zeros times a factor remain right."""
     found = crosscheck.judge_motion(spinning_rod(), pulls(scale))
     assert {c.name for c in found.columns if not c.is_right} == {"A.force.x", "A.force.y"}
     assert says in found.explanations[0].sentence

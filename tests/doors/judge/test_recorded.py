@@ -82,8 +82,8 @@ PLANTED = {
     ids=["default, 1e-8", "2e-8", "zero"],
 )
 def test_column_is_right_within_the_tolerance_of_its_scale(table, tolerance, right):
-    """Errors put in: 0.9e-8 of the mechanism's length in a position, 1.9e-8 of the largest angular velocity
-    in a rate. A right column has no time at which its error begins."""
+    """The errors put in are 0.9e-8 of the mechanism's length in a position, and 1.9e-8 of the largest angular
+    velocity in a rate. A right column has no time at which its error begins."""
     spin = max(abs(table[f"{b}.angular_velocity.{a}"]).max() for b in ("upper", "lower") for a in "xyz")
     errors = {"upper.position.x": 0.9e-8 * scene_length(SCENE), "upper.angular_velocity.z": 1.9e-8 * spin}
     once = np.arange(len(TIMES)) == 40  # one sample of a column, for which no explanation is searched
@@ -165,7 +165,8 @@ def test_faulty_table_is_refused_with_its_fault(text, columns, says, tmp_path):
     ],
 )
 def test_chosen_columns_have_the_units_and_places_of_their_headers(headers, columns, order, table, tmp_path):
-    """A second column in mm by number or header; components with w last, with names of either order."""
+    """Two columns are x in mm, of which one is chosen by number or header. Quaternions have w last, by their
+    names or by the order that is given."""
     wanted = [table["lower.position.x"] * 1e3] * 2
     if "q" in headers:
         wanted = [table[f"lower.orientation.{a}"] for a in "xyzw"]
@@ -215,7 +216,7 @@ def test_angle_of_millions_of_turns_is_right_within_its_rounding(duration):
 
 
 def test_judge_command_ends_with_status_2_for_what_it_cannot_read(tmp_path):
-    """A tolerance that is negative or no number, a column without a number, a file that does not exist."""
+    """Wrong are a negative tolerance or one that is no number, a column without number, a missing file."""
     SCENE.save(tmp_path / "s.toml")
     (tmp_path / "t.csv").write_text("time,upper.x\n0,1\n")
     judge, motion = ["judge", str(tmp_path / "s.toml")], str(tmp_path / "t.csv")

@@ -194,7 +194,7 @@ def test_twenty_digits_are_certified_by_both_formulations():
     ],
 )
 def test_thirty_digits_and_extended_precision_move_alike(make, times):
-    """Formulation A in 30 and in 19 digits: positions up to 1 m, rounded to doubles, agree to 1e-15 m."""
+    """Formulation A runs in 30 and in 19 digits: positions of up to 1 m, in doubles, agree to 1e-15 m."""
     pytest.importorskip("flint", reason="python-flint is the extra `certify`")
     scene = make()
     motion = natural_motion(scene, times, many_digits(30), order=30, tolerance=1e-20, seconds=SECONDS)

@@ -99,7 +99,7 @@ def test_states_of_a_reference_do_not_depend_on_other_samples(name):
 @pytest.mark.parametrize("size", [1e-4, 1e4])
 @pytest.mark.parametrize("name", ["four hinges", "doubled hinge", "slider-crank of hinges"])
 def test_number_of_undetermined_reactions_of_each_joint_does_not_depend_on_the_size(name, size):
-    """Redundant joints share reactions in undetermined parts, whose number is a fact of the directions."""
+    """Redundant joints share reactions in undetermined parts; directions of axes give their number."""
     plain = MOTIONS[name]()
     scene = in_other_units(plain, 1.0, size, 1.0)
     shared, wanted = (shared_wrenches(s, 0.0, *constraints.initial_poses(s)) for s in (scene, plain))

@@ -93,7 +93,7 @@ KEEPING = ("rotated", "mirrored", "scaled", "enlarged", "in millimetres")  # bod
     [pytest.param(r, s, marks=[pytest.mark.slow] * (s != QUICK[r][0])) for r in KEEPING for s in SCENES],
 )
 def test_reactions_that_a_relation_expects_balance_the_changed_mechanism(relation, name):
-    """Newton's and Euler's equations of every body with the expected reactions and the judge's accelerations,
+    """Expected reactions satisfy Newton's and Euler's equations of every body with the judge's accelerations,
     which are exact to 1e-10; ten times this, relative to the largest force, is allowed."""
     scene, expected, found = changed_motion(relation, name)
     assert set(expected.reactions) == {joint.name for joint in scene.joint}

@@ -154,7 +154,7 @@ def test_exudyn_s_own_linearisation_leaves_out_how_constraint_forces_turn():
     ],
 )
 def test_scenes_without_small_motions_are_refused(change, says):
-    """A pendulum about a horizontal axis whose driver accelerates, turns or holds it, or without a mass."""
+    """The driver of a horizontal pendulum accelerates, turns or holds it, or the pendulum has no mass."""
     with pytest.raises(SceneError, match=says):
         steady_poses(pendulum().with_(**change), starts=1)
 

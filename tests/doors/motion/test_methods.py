@@ -116,7 +116,7 @@ def test_adams_meets_its_tolerance_in_about_50_steps_or_130_at_order_4(options, 
 @pytest.mark.parametrize("rtol", [1e-5, 1e-8, 1e-11])
 @pytest.mark.parametrize("method", ["lm2+projection", "lm2+projection/adams", "taylor"])
 def test_error_of_poses_is_at_most_ten_times_the_tolerance(method, rtol):
-    """The error against the judge of a damped pendulum; local errors of its few steps add up."""
+    """The judge has the exact states of a damped pendulum; local errors of the few steps add up."""
     pose, _, _ = errors("pendulum with spring with damping", method, rtol)
     assert pose < 10 * rtol
 

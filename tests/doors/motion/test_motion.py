@@ -69,7 +69,7 @@ def test_energy_of_a_motion_without_masses_is_refused_with_the_body_and_is_no_co
 
 
 def test_saved_motion_is_read_back_equal(crank, tmp_path):
-    """Scene, outcome, cost, the record with all numbers, and the names of columns."""
+    """Equal are scene, outcome, cost, the record with all numbers, and the names of columns."""
     crank.save(tmp_path / "run.json")
     again = Motion.load(tmp_path / "run.json")
     assert again.mechanism == crank.mechanism and again.outcome is crank.outcome and again.cost == crank.cost

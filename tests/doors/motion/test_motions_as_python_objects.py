@@ -77,6 +77,7 @@ def test_faulty_entry_made_in_python_is_refused_without_a_word_of_pydantic(kind,
 
 
 def test_entry_cannot_be_changed_and_its_error_names_the_remedy():
+    """The remedy is ``with_``, which returns a changed copy."""
     scene = mbref.find_scene("four_bar")
     with pytest.raises(AttributeError, match=r"scene\.with_\(\.\.\.\) returns a changed copy"):
         scene.duration = 3.0

@@ -43,8 +43,8 @@ def spinning(load=()):
 
 @pytest.mark.parametrize("turn", [0.5, 2.0])
 def test_largest_turn_bounds_the_angle_that_a_body_turns_in_a_step(turn):
-    """100 rad in steps of at most ``turn`` (rad). The tolerance, rtol 0.9, would allow longer steps; at most
-    12 shorter steps lead from the first step of 1 ms to this length."""
+    """A body turns by 100 rad in steps of at most ``turn`` (rad). The tolerance, rtol 0.9, would allow longer
+    steps; at most 12 shorter steps lead from the first step of 1 ms to this length."""
     limits = Limits(rtol=0.9, largest_turn=turn, first_step=1e-3)
     steps = completed(spinning(), "lm1+projection", [10.0], limits).cost.steps
     assert 100 / turn <= steps < 100 / turn + 12
@@ -52,8 +52,8 @@ def test_largest_turn_bounds_the_angle_that_a_body_turns_in_a_step(turn):
 
 @pytest.mark.parametrize("method", ["lm1+none", "lm1+projection", "lm1+projection/adams"])
 def test_fast_spin_at_a_loose_tolerance_is_followed_over_every_turn(method):
-    """100 rad, to 0.01, in one sample; steps as long as rtol 0.9 allows would lose turns and torque of the
-    spring, whose stiffness of 1e-9 N m/rad does not change the spin."""
+    """The body turns by 100 rad, to 0.01, before its sample; steps as long as rtol 0.9 allows would lose
+    turns and torque of the spring, whose stiffness of 1e-9 N m/rad does not change the spin."""
     run = completed(spinning((TorsionSpring(joint="H", stiffness=1e-9),)), method, [0, 10], Limits(rtol=0.9))
     assert run.load_at(0).angle[-1] == pytest.approx(100.0, abs=0.01)
     assert difference(np.abs(run.orientation[-1, 0, :2]), np.abs([np.cos(50.0), np.sin(50.0)])) < 0.01

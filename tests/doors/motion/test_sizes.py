@@ -20,7 +20,7 @@ def ends(scene: Scene) -> tuple[tuple[Outcome, str, int], np.ndarray]:
     "name", ["four_bar_quarter", "planar_slider_crank_equal", "flyball_governor", "bennett"]
 )
 def test_built_in_scenes_complete_with_proportional_positions_at_every_size(name, length, time):
-    """In other units of length and time; outcome, message and number of crossings are equal."""
+    """Units of length and time are changed; outcome, message and number of crossings are equal."""
     scene = find_scene(name)
     scene = scene.with_(duration=min(scene.duration, 0.2))
     (expected, place), (found, other) = ends(scene), ends(in_other_units(scene, length, time))

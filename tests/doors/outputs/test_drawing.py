@@ -174,7 +174,7 @@ def test_animation_is_replaced_by_a_still_for_readers_who_prefer_reduced_motion(
 
 
 def test_motions_side_by_side_share_scale_and_time_and_a_shorter_one_stops(turning):
-    """Three motions of 300, the first 100 and all 300 samples, two in a row; every third is a frame."""
+    """Three motions, of 300, the first 100 and all 300 samples, are two in a row; every third is a frame."""
     scene, motion = turning
     short = dataclasses.replace(
         motion, **{name: getattr(motion, name)[:100] for name in ("times", "position", "orientation")}

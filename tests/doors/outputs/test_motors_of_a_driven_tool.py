@@ -135,8 +135,8 @@ def test_torques_as_tables_move_the_free_arm_along_the_circle():
 
 
 def test_torques_do_not_depend_on_units_and_order():
-    """In units of half a kg, mm and 10 ms: forces have other numbers, and the least norm is the same, also
-    of motors with torques and a motor with a force. Bodies, joints and drivers in reverse order."""
+    """In units of half a kg, mm and 10 ms forces have other numbers, and the least norm is the same, also of
+    motors with torques and a motor with a force. Reverse order of bodies, joints and drivers changes none."""
     motors = ["A", "E", "tool x"]
     mass, length, time = 2.0, 1e3, 100.0
     own = mbref.inverse_dynamics(moved(), motors).motors

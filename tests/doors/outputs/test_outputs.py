@@ -61,7 +61,7 @@ def sprung() -> Motion:
 
 
 def test_length_rate_and_force_of_a_spring_follow_from_geometry(sprung):
-    """The law of cosines, to rounding (ACCURACY); force and power are k (l - l₀) + c l' and -F l'."""
+    """The length is a distance of two points; force and power are k (l - l₀) + c l' and -F l' (ACCURACY)."""
     theta, turning, _ = angle(TIMES)
     tip = 1.2 * np.stack([np.cos(theta), np.sin(theta)], axis=1)
     speed = 1.2 * turning[:, None] * np.stack([-np.sin(theta), np.cos(theta)], axis=1)
@@ -179,7 +179,7 @@ def test_command_plot_writes_png_and_svg(tmp_path):
 
 
 def test_gif_of_a_short_motion_plays_four_seconds(tmp_path):
-    """A motion of 1 s, slowed to 4 s: the frames' durations (ms) in the file add up to it."""
+    """A motion of 1 s is slowed to 4 s: the frames' durations (ms) in the file add up to it."""
     from PIL import Image
 
     path = tmp_path / "my.toml"

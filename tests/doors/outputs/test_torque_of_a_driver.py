@@ -102,7 +102,7 @@ def test_run_states_that_the_torque_of_a_driver_that_it_prints_is_not_determined
 
 @pytest.mark.parametrize("name", [n for n in ("mujoco", "pinocchio") if installed(n)])
 def test_motion_of_an_engine_has_the_torque_of_its_motor(name):
-    """Torque (J + I) φ'', J = 0.1, I = 0.4 kg m²; the engine's own error is below 1e-6 of the largest."""
+    """The torque is (J + I) φ'', J = 0.1, I = 0.4 kg m², to 1e-6 of the largest, above the engine's error."""
     bodies, joints = wheels(0.4)
     scene = Scene(name="driven", body=bodies, joint=joints, driver=[{"joint": "A", **TURN}])
     simulator = engine(name)

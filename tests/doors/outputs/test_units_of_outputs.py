@@ -94,7 +94,7 @@ def test_largest_reaction_of_a_crank_is_at_the_bottom(motion):
 
 
 def test_command_prints_largest_reactions_and_their_times_in_the_requested_units(tmp_path, capsys):
-    """The crank's moment m g r in N mm, and its force m (ω² r + g) in N at 750 ms."""
+    """Printed are the crank's moment m g r in N mm, and its force m (ω² r + g) in N at 750 ms."""
     crank().save(tmp_path / "crank.toml")
     command = ["run", str(tmp_path / "crank.toml"), "--samples", "9", "--maxima", "--units", "N mm,mm,ms"]
     assert main(command) == 0

@@ -97,8 +97,8 @@ def test_coriolis_forces_couple_two_slides_of_a_turning_table():
 
 
 def test_a_body_on_a_ball_joint_has_the_roots_of_eulers_equations():
-    """Torque-free rotation about a principal axis, seen from the turning spindle: s = ± i Ω and s² = -Ω² (C -
-    A) (C - B) / (A B). The angle about the axis is free: a double eigenvalue of zero, which rounding splits
+    """The body turns without torque about a principal axis: seen from the spindle, s = ± i Ω and s² = -Ω² (C
+    - A) (C - B) / (A B). The angle about the axis is free: a double eigenvalue of zero, which rounding splits
     by its square root, up to 1e-4 rad/s."""
     rate, (a, b, c) = 5.0, (0.02, 0.03, 0.045)
     turned = {"name": "body", "mass": 1.0, "inertia": [a, b, c], "position": ORIGIN}
