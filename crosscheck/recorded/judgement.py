@@ -15,7 +15,7 @@ from crosscheck.judge.start import started
 from crosscheck.judge.tolerances import FLOOR
 from crosscheck.recorded.column_errors import ColumnError, Columns, Compared, aligned
 from crosscheck.recorded.columns import kind_of, names, scales, start_columns
-from crosscheck.recorded.exact import DENSE, Exact, dense_exact, uncounted
+from crosscheck.recorded.exact import DENSE, Exact, dense_exact, reaching_to, uncounted
 from crosscheck.recorded.explanations import Explanation, with_signs
 from crosscheck.recorded.leaps import leaps, with_sides
 from crosscheck.recorded.reading import Recording, read
@@ -92,8 +92,9 @@ def judge_motion(
     SceneError
         If the table has no column of the scene, or the scene has no reference.
     """
-    recording = _from_start(scene, _as_recording(scene, motion))
-    scene = started(scene)
+    recording = _as_recording(scene, motion)
+    scene = reaching_to(scene, recording.times)
+    recording, scene = _from_start(scene, recording), started(scene)
     sides = [t for both in leaps(scene, recording.times).values() for t in both]
     times = np.union1d(recording.times, sides)
     found, columns = dense_exact(scene, times, seconds, recording.columns)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mbref.ensembles.batch import BatchResult, may_lead, run_batch
+from mbref.equations.functions import reaching
 from mbref.equations.parts import shape_of
 from mbref.method import Method
 from mbref.motions.motion import Motion
@@ -53,6 +54,7 @@ def simulate_all(
 ) -> list[Motion]:
     """Return the motions of the scenes. Each motion equals the result of ``simulate`` for the scene. Raises
     the errors of ``simulate``."""
+    scenes = [reaching(scene, float(times[-1])) for scene in scenes]
     ended = run_all(scenes, method, times, limits)
     if ended.error:
         raise ended.error

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mbref.equations.functions import functions_of
+from mbref.equations.functions import reaching
 from mbref.equations.matrices import Matrices
 from mbref.input_error import InputError
 from mbref.kernels.background import compiled_in_background
@@ -88,7 +88,7 @@ def simulate(
     Raises
     ------
     SceneError
-        If the scene cannot be simulated.
+        If the scene cannot be simulated, or a table ends before the last sample.
     InputError
         If times do not increase or are given beside a duration, ``limits.order`` is none of the integrator's,
         a formulation is given beside a method or a stabilisation without a formulation, or a function returns
@@ -106,8 +106,7 @@ def simulate(
     if rtol is not None:
         limits = replace(limits, rtol=rtol)
     times = checked_times(np.linspace(0.0, scene.duration, SAMPLES) if times is None else times)
-    if times[-1] > scene.duration and any(function.periodic for function in functions_of(scene)):
-        scene = scene.with_(duration=float(times[-1]))  # periodic tables repeat up to there
+    scene = reaching(scene, float(times[-1]))
     run = _run_of(method, formulation, stabilisation, limits)
     if not is_intermittent(scene):
         return run(scene, times, progress)

@@ -8,7 +8,9 @@ import mbref
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
+from crosscheck.recorded.judgement import judge_motion
 from mbref.cli import main
+from mbref.ensembles.simulate_all import simulate_all
 from mbref.scene import Driver, Factor, JointForce, SceneError
 from mbref.scene.interpolation import interpolation_error
 from tests.helpers.loads_over_time import AXIS, slide, wheel
@@ -37,6 +39,33 @@ def test_wheel_turns_by_the_periodic_spline_through_the_rows_of_its_driver(durat
     motion = mbref.simulate(driven(duration), method, SAMPLES, rtol=1e-12)
     assert motion.joint("J").angle == pytest.approx(EXACT(SAMPLES % PERIOD), abs=1e-12)
     assert motion.angular_acceleration[:, 0, 2] == pytest.approx(EXACT(SAMPLES % PERIOD, 2), abs=1e-9)
+
+
+def test_periodic_table_repeats_beyond_the_duration_in_batches_matrices_and_for_the_judge():
+    """A scene of one period; SciPy's spline gives the angle at 2.5 s, and the judge finds it right."""
+    scene, angle = driven(PERIOD), EXACT(SAMPLES % PERIOD)
+    _, second = simulate_all([scene, scene], "taylor", SAMPLES, mbref.Limits(rtol=1e-12))
+    assert second.joint("J").angle == pytest.approx(angle, abs=1e-12)
+    assert second.joint("J").rate == pytest.approx(EXACT(SAMPLES % PERIOD, 1), abs=1e-10)
+    assert mbref.terms(scene, 2.5).v[5] == pytest.approx(EXACT(2.5 % PERIOD, 1), abs=1e-8)
+    assert judge_motion(scene, {"time": SAMPLES, "J.angle": angle}).is_right
+
+
+def test_table_that_ends_before_the_last_time_is_refused_by_its_line(capsys, tmp_path):
+    """Beyond its last row, at 0.8 s, a table says nothing: its cubic would go on."""
+    scene = driven(PERIOD).with_(driver=[Driver(joint="J", table=TABLE)])
+    doors = (
+        lambda: mbref.simulate(scene, times=[0.0, 2.5]),
+        lambda: simulate_all([scene], "taylor", SAMPLES, mbref.Limits()),
+        lambda: mbref.terms(scene, 2.5),
+        lambda: judge_motion(scene, {"time": SAMPLES, "J.angle": 0.0 * SAMPLES}),
+    )
+    for door in doors:
+        with pytest.raises(SceneError, match=r"driver\[J\].table: leaves a gap: .* 0.8 s, .* until 2.5 s"):
+            door()
+    scene.save(tmp_path / "wheel.toml")
+    assert main(["run", str(tmp_path / "wheel.toml"), "--duration", "2.5"]) == 2
+    assert "acts until 2.5 s" in capsys.readouterr().err
 
 
 def test_mass_under_a_periodic_force_moves_by_its_double_integral_in_mbref_and_both_formulations(tmp_path):
