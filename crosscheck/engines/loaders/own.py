@@ -71,7 +71,7 @@ class Imported(Loaded):
         bodies, couplings = [self._body(k) for k in range(len(self.scene.body))], list(self._couplings())
         if any(MOVED in message for message in self.messages):
             bodies = [replace(body, centre=None, inertia=None) for body in bodies]
-            tree = [replace(joint, anchor=None, axis=None) for joint in tree]
+            tree = [replace(joint, anchor=None, axis=None, rest=None) for joint in tree]
             loops = [replace(loop, anchors=None) for loop in loops]
             couplings = [replace(coupling, coefficients=()) for coupling in couplings]
         return Machine(

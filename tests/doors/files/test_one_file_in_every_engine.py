@@ -119,6 +119,14 @@ def test_own_import_builds_the_machine_of_each_file_of_the_corpus(step: int, tmp
         assert {d.field for d in found} <= {"limits", "friction"}, (case.name, found)
 
 
+def test_rest_of_a_spring_is_no_difference_where_the_import_moved_the_joint(tmp_path: Path):
+    """An offset of 0.1 moves the elbow, so that the scene's spring counts from another pose."""
+    path = written(tmp_path, LOOP.replace('name="elbow"', 'name="elbow" stiffness="2" springref="0.3"'))
+    (elbow,) = (joint for joint in meant(path, MJCF).joints if joint.name == "elbow")
+    found = of_reading(matched(meant(path, MJCF), Own().load(path, MJCF).machine(), DOUBLE), DOUBLE)
+    assert elbow.rest and "rest" not in {d.field for d in found}
+
+
 @pytest.mark.parametrize("planted", PLANTED, ids=" ".join)
 def test_planted_difference_is_named_by_part_and_field(planted: tuple[str, str, str], tmp_path: Path):
     """One field of one part of the file's machine is changed; ``planted`` names part and field."""
