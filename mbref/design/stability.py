@@ -53,8 +53,9 @@ def linear_at(tangent: Tangent, away: np.ndarray) -> Linear:
 def _by_place(tangent: Tangent) -> tuple[np.ndarray, np.ndarray]:
     """Return A and the largest errors of its entries (f, f).
 
-    The step of the differences is shortened until A no longer changes with it, except by rounding. If A
-    changes with the shortest step, too, the errors are the largest difference of all steps.
+    The step of the differences is shortened until A no longer changes with it, except by rounding, of the
+    entry or of the entry with the largest forces. If A changes with the shortest step, too, the errors are
+    the largest difference of all steps.
     """
     share, found = 1.0, list[np.ndarray]()
     while share >= SHORTEST_STEP:
@@ -62,7 +63,8 @@ def _by_place(tangent: Tangent) -> tuple[np.ndarray, np.ndarray]:
         inverse_steps = _inverse_steps(tangent) / share
         rounded = tangent.pushes[:, None] * inverse_steps + np.abs(place) * inverse_steps / tangent.sizes
         changes, found = CHANGES * np.abs(place - other), [*found, place]
-        if not (changes > LONG_STEP * rounded).any():
+        # a freedom without a force is rounded by forces that joints pass on to its body
+        if not (changes > np.maximum(LONG_STEP * rounded, rounded.max(initial=0.0))).any():
             return place, changes + rounded
         share *= SHORTENED
     return place, np.max([np.abs(each - place) for each in found], axis=0) + changes + rounded
