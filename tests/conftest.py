@@ -4,6 +4,7 @@ other. ``slow.toml`` lists cases with the mark slow."""
 
 import gc
 import os
+import sys
 import tomllib
 from collections.abc import Iterator
 from contextlib import suppress
@@ -73,7 +74,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         and not names_missing_engine(pattern)
     ]
     if wrong:
-        raise pytest.UsageError(f"tests/slow.toml lists cases that do not exist: {', '.join(wrong)}")
+        fault = f"tests/slow.toml lists cases that do not exist: {', '.join(wrong)}"
+        print(fault, file=sys.stderr)  # pytest-xdist hides the error of a worker
+        raise pytest.UsageError(fault)
 
 
 def names_missing_engine(pattern: str) -> bool:
