@@ -157,7 +157,7 @@ def differences(subject: Subject, scene: Scene) -> float:
     with open loops."""
     found = subject.found(scene)
     if not isinstance(found, OwnDerivatives):
-        raise NotAsked("the engine's derivatives are along allowed motions only, so that it has no others")
+        raise NotAsked("the engine has derivatives along allowed motions only, and no accelerations off them")
     source = (subject.engine.name, subject.engine.version(), subject.function, scene.name)
     rows = [*compare.own_rows(subject.differentiating, found, source, scene)]
     errors = [row.error for row in rows if row.grade != compare.UNDECIDED]

@@ -213,7 +213,7 @@ class DerivativeRequest:
         """Return a run by a method and its changes by the numbers; it has the panels of a run ``before``."""
         model, step = self.model, precision.step
         run = Followed.of(self.scene, model, method, limits, self.samples, gauss(precision.points), before)
-        if run.undecided_from > 0.0:
+        if before is None and run.undecided_from > 0.0:  # a second run has the same start
             basis = TangentRows(model, run.first, partition_of(model, run.first)).basis[0]
             refuse_abrupt_springs(model, run.first, basis, self.has_points)
         self.motion = self.motion or run.motion
