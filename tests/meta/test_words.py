@@ -56,10 +56,10 @@ def test_docstrings_and_comments_contain_no_private_word():
 @pytest.mark.parametrize(
     ("text", "count"),
     [
-        ('"""Those of the rows."""\n', 1),
+        ('"""Those of the rows."""\n', 1),  # a verbless beginning
         ('"""Return the rows."""\n', 0),
-        ('"""Rows, but for one."""\n', 1),
-        ("x = 1  # that of the other\n", 1),
+        ('"""Rows, but for one."""\n', 1),  # "but for"
+        ("x = 1  # that of the other\n", 1),  # "that of"
         ('"""Return ``told`` rows."""\n', 0),
         ('told = "or why"\n', 0),
     ],

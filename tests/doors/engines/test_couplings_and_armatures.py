@@ -171,8 +171,9 @@ def test_engine_moves_a_coupling_with_offset_as_the_reference(name):
     assert found["error"] <= 1e-8, (found, run.message)
 
 
-def test_engines_refuse_a_scene_that_is_not_assembled():
-    """The coupling's offset does not hold in the file's poses; the reason names it and the remedy."""
+def test_mujocos_adapter_refuses_a_scene_that_is_not_assembled():
+    """Poses of the file violate the coupling's offset. The reason names it, and the function that
+    assembles."""
     refusal = engine("mujoco").cannot(shifted(gear_pair, "teeth", 0.4))
     assert refusal is not None
     assert refusal.reason == (
@@ -208,7 +209,8 @@ def test_find_scenes_assembles_offsets_and_read_scenes_does_not(tmp_path):
 
 
 def test_mjcf_keeps_the_offset_of_a_coupling(tmp_path):
-    """A rack written and read again moves alike, to 1e-12 m; without its offset of 3 mm over 2 mm away."""
+    """A rack whose coupling has an offset of 3 mm is written and read again. It moves alike, to 1e-12 m; the
+    rack without the offset is more than 2 mm away."""
     pytest.importorskip("mujoco")
     scene, path = shifted(rack, "teeth", 0.003), tmp_path / "rack.xml"
     formats.write(scene, path)

@@ -116,8 +116,8 @@ def test_ondsel_moves_every_joint_type_as_pinocchio(swapped: bool) -> None:
 
 @pytest.mark.parametrize("swapped", [False, True])
 def test_driver_with_a_phase_turns_the_joint_as_prescribed(swapped: bool) -> None:
-    """φ = 0.3 sin(5 t + 0.4) - t - 0.3 sin 0.4 (rad), to 1e-13 rad of rounding. Two spacings of samples, so
-    that the second analysis begins in the middle of the motion."""
+    """φ = 0.3 sin(5 t + 0.4) - t - 0.3 sin 0.4 (rad), to 1e-13 rad of rounding, also if every joint has its
+    two bodies swapped. Two spacings of samples, so that the second analysis begins within the motion."""
     sine = Sine(amplitude=0.3, frequency=5.0, phase=0.4)
     start = -sine.amplitude * math.sin(sine.phase)
     base = clockwork(swapped)

@@ -107,8 +107,8 @@ def test_piston_of_a_cut_slide_is_read_in_two_parts_with_its_mass_after_a_round_
 
 @pytest.mark.parametrize("name", EXPORTED)
 def test_an_exported_scene_accelerates_in_mujoco_and_moves_when_read_again_as_the_scene(name, tmp_path):
-    """MJCF has no drivers and no start velocities, which are taken from the scene: it begins at rest. Gravity
-    is along no axis, so that it accelerates every mechanism."""
+    """The scene loses what MJCF cannot have: its drivers, start velocities and other loads. Gravity along no
+    axis accelerates every mechanism. ``difference`` is the judge's check of models: None if all agrees."""
     scene = find_scene(name)
     loads = [load for load in scene.load if load.type in ("spring", "torsion_spring")]
     bodies = [b.model_copy(update={"velocity": None, "angular_velocity": None}) for b in scene.body]

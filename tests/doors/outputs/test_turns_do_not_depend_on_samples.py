@@ -11,7 +11,7 @@ import pytest
 
 import mbref
 from crosscheck.judge.constraints import coupling_gaps
-from crosscheck.judge.energy import energy_series
+from crosscheck.judge.energy import energy_drift, energy_series
 from mbref.cli import main
 from mbref.scene import Scene
 from tests.helpers.coupled_mechanisms import gear_pair
@@ -162,10 +162,13 @@ def test_turns_of_steady_gears_are_counted_by_their_rates_where_samples_are_turn
 
 
 def test_judge_sees_a_miscounted_turn_of_few_samples_as_a_change_of_energy():
-    """The spring's energy, 12 (φ - 40)² / 2, with the run's own turns is constant to 1e-9 (CLOSE); one turn
-    more changes it by more than 0.001; without turns it is unknown (None)."""
+    """With the run's own turns, kinetic energy and 12 (φ - 40)² / 2 J of the spring have a constant sum, to
+    1e-9 of it (CLOSE). One turn more adds 2π to φ, and 12 · 2π (φ - 40 + π) J to the sum. Without turns the
+    sum is unknown (None)."""
     few = mbref.simulate(wound_wheel(), times=[0.7, END])
     assert energy_series(few.mechanism, few).max() < CLOSE
     assert energy_series(few.mechanism, replace(few, angles=None)) is None
-    wrong = {"H": few.angles["H"] + 2 * np.pi}
-    assert energy_series(few.mechanism, replace(few, angles=wrong)).min() > 1e-3
+    turned = NATURAL * (1.0 - np.cos(2.0 * few.times))
+    wrong = replace(few, angles={"H": few.angles["H"] + 2 * np.pi})
+    change = STIFFNESS * 2 * np.pi * (turned - NATURAL + np.pi)
+    assert energy_drift(few.mechanism, wrong) == pytest.approx(np.abs(change), rel=CLOSE)
