@@ -154,7 +154,7 @@ def _unreached(wanted: Criterion, nearest: Record) -> str:
     if not is_completed(nearest):
         return f"No setting reaches {wanted.name}: no run completes. The one that got furthest:"
     if not math.isfinite(wanted.measure(nearest)):
-        return "No error is known, because no truth of this motion is known. One of the runs:"
+        return f"{wanted.unknown(nearest)} One of the runs:"
     if bound > wanted.level and wanted.measure is known_error:
         known = f"The truth is known to {bound:.0e}"
         return f"{known}, so no run can be seen to reach {wanted.level:g}. The nearest:"

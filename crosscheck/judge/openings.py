@@ -13,15 +13,17 @@ from mbref.scene import Scene
 
 
 class Opening(NamedTuple):
-    """Largest openings over all joints and samples; infinite without a sample or for numbers that are not
-    finite.
+    """Largest openings over all joints and samples; infinite without a sample, for numbers that are not
+    finite, and for a coupling that is not counted.
 
     ``gap`` (m) is the distance between a joint's points, or the displacement by which a coupling is off.
-    ``angle`` (rad) is the angle by which a joint tilts or a coupling is off.
+    ``angle`` (rad) is the angle by which a joint tilts or a coupling is off. ``uncounted`` names couplings
+    whose joints turn too far between samples for their full turns to be counted.
     """
 
     gap: float
     angle: float
+    uncounted: tuple[str, ...] = ()
 
 
 def opening(scene: Scene, run: Trajectory) -> Opening:
@@ -31,13 +33,13 @@ def opening(scene: Scene, run: Trajectory) -> Opening:
     pose = (run.times, run.position, run.orientation)
     with np.errstate(all="ignore"):  # states that are not finite are reported, without warnings
         residuals = constraints.closure(scene.with_(driver=()), *pose)
-        gaps = constraints.coupling_gaps(scene, *pose, run.angular_velocity)
-        # NaN: the samples are too far apart to count the turns of a coupling
-        residuals |= {name: np.nan_to_num(gap, nan=0.0) for name, gap in gaps.items()}
+        gaps = constraints.coupling_gaps(scene, *pose, run.angular_velocity, run.angles)
+        residuals |= gaps
     are_lengths = constraints.length_rows(scene.with_(driver=()))
     return Opening(
         _largest([r[:, are_lengths[name]] for name, r in residuals.items()]),
         _largest([r[:, ~are_lengths[name]] for name, r in residuals.items()]),
+        tuple(name for name, gap in gaps.items() if np.isnan(gap).any()),
     )
 
 

@@ -110,9 +110,7 @@ def _paired(old: Record | None, new: Record | None) -> Sequence[tuple[Record | N
 
 def _is_other_mechanism(old: Record | None, new: Record | None) -> bool:
     """Return whether both records name their mechanisms, and the mechanisms differ."""
-    if old is None or new is None:
-        return False
-    return len({old.get("mechanism"), new.get("mechanism")} - {None}) > 1
+    return bool(old and new and len({old.get("mechanism"), new.get("mechanism")} - {None}) > 1)
 
 
 def circumstances(old: Mapping[Identity, Record], new: Mapping[Identity, Record]) -> list[str]:
@@ -121,6 +119,7 @@ def circumstances(old: Mapping[Identity, Record], new: Mapping[Identity, Record]
     names = dict.fromkeys([*before, *after])
     both = [(old[name], new[name]) for name in new if name in old]
     others = dict.fromkeys(b["scene"] for a, b in both if _is_other_mechanism(a, b))
+    unnamed = dict.fromkeys(b["scene"] for a, b in both if not (a.get("mechanism") and b.get("mechanism")))
     untimed = sum(a["machine"] != b["machine"] for a, b in both if not _is_other_mechanism(a, b))
     return [
         *(
@@ -129,6 +128,7 @@ def circumstances(old: Mapping[Identity, Record], new: Mapping[Identity, Record]
             if before.get(name) != after.get(name)
         ),
         *(f"{scene}: the mechanism was changed, so its runs are not compared." for scene in others),
+        *(f"{scene}: records name no mechanism, so it may have changed unseen." for scene in unnamed),
         *([f"Times of {runs(untimed)} are not compared: the machines differ."] if untimed else []),
     ]
 

@@ -25,6 +25,7 @@ from crosscheck.study.search.neighbours import (
     work,
 )
 from crosscheck.study.search.selection import Family, families
+from crosscheck.study.words.text import listed
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 
@@ -39,27 +40,37 @@ Run = Callable[[Sequence[Case]], list[Record]]
 
 class Criterion(NamedTuple):
     """A criterion for runs: a number of the record must not exceed a level. The criterion has a name for
-    sentences and a text for values."""
+    sentences, a text for values, and a sentence on a number that is not known."""
 
     name: str
     level: float
     measure: Callable[[Record], float]
     text: Callable[[Record], str]
+    unknown: Callable[[Record], str]
 
 
 def by_error(level: float) -> Criterion:
     """Return the criterion that the error of a run is at most ``level``, the bound on the truth included."""
-    return Criterion(f"an error of {level:g}", level, known_error, error_text)
+    unknown = "No error is known, because no truth of this motion is known."
+    return Criterion(f"an error of {level:g}", level, known_error, error_text, lambda record: unknown)
 
 
 def by_closure(gap: float, scene: Scene) -> Criterion:
-    """Return the criterion that the points of no joint are apart by more than a gap (m)."""
+    """Return the criterion that no joint's points are apart, and no coupling is off, by more than a gap
+    (m)."""
 
     def measure(record: Record) -> float:
         return opened(record, scene).gap
 
-    name = f"a closure gap of {gap * 1e3:g} mm"
-    return Criterion(name, gap, measure, lambda record: f"{measure(record) * 1e3:.2g} mm")
+    def unknown(record: Record) -> str:
+        said = listed([f"coupling {name!r}" for name in opened(record, scene).uncounted])
+        return f"No closure gap is known: turns of {said} between samples cannot be counted (--duration)."
+
+    def text(record: Record) -> str:
+        found = measure(record)
+        return f"{found * 1e3:.2g} mm" if math.isfinite(found) else "–"
+
+    return Criterion(f"a closure gap of {gap * 1e3:g} mm", gap, measure, text, unknown)
 
 
 def opened(record: Record, scene: Scene) -> Opening:

@@ -38,9 +38,11 @@ def _one(group: Judged, record: Record) -> str:
         return f"{start} is {ended(record)}: {record['message']}."
     metrics, found = record["metrics"], grade(record)
     parts = [] if found is Grade.UNJUDGED else [_bodies(metrics, scene_length(scene))]
-    gap, angle = opened(record, scene)
+    gap, angle, uncounted = opened(record, scene)
     if said_of_joints := _openings(gap, angle, scene_length(scene)):
         parts.append(f"its closures open by up to {said_of_joints}")
+    if uncounted:
+        parts.append(f"full turns of {listed(uncounted)} cannot be counted between samples")
     said = "has no known error" if found is Grade.UNJUDGED else f"is {found}"
     advice = ""
     if found in (Grade.INACCURATE, Grade.WRONG):

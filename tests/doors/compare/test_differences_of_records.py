@@ -158,16 +158,16 @@ def circumstance(engine: str, version: str, cpu: str, **more: Any) -> dict[str, 
 def test_comparison_of_records_names_changed_versions_machines_and_mechanisms():
     """``circumstance`` is a record of scene s by an engine, its version and a processor. Engine a has
     versions 1.0 and 1.1 before and 1.0 after, engine b none and 2. Run 1 is repeated on another processor;
-    run 2 too, but of another mechanism, so that its time is not counted."""
+    run 2 too, but of another mechanism, so that its time is not counted. In the new set run 1 names none."""
     old = {
-        "1": circumstance("a", "1.0", "x", commit="c1"),
+        "1": circumstance("a", "1.0", "x", commit="c1", mechanism="m1"),
         "2": circumstance("a", "1.1", "x", mechanism="m1"),
-        "3": circumstance("b", "", "x"),
+        "3": circumstance("b", "", "x", mechanism="m3"),
     }
     new = {
         "1": circumstance("a", "1.0", "y", commit="c1"),
         "2": circumstance("a", "1.0", "y", mechanism="m2"),
-        "3": circumstance("b", "2", "x"),
+        "3": circumstance("b", "2", "x", mechanism="m3"),
     }
     assert circumstances(old, old) == []
     assert circumstances(old, new) == [
@@ -175,5 +175,6 @@ def test_comparison_of_records_names_changed_versions_machines_and_mechanisms():
         "cpu: x → x, y",
         "b: none → 2",
         "s: the mechanism was changed, so its runs are not compared.",
+        "s: records name no mechanism, so it may have changed unseen.",
         "Times of 1 run are not compared: the machines differ.",
     ]

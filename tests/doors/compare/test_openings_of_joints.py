@@ -1,15 +1,19 @@
 """Openings of joints: a gap is a distance of points, and angles do not depend on the size."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import mbref
 from crosscheck.judge.openings import opening
+from crosscheck.study.search.cheapest import by_closure
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 from tests.helpers.geared_arms import arms
+from tests.helpers.parts import hinge
 
 TIMES = np.array([0.0, 1.0])
 
@@ -52,3 +56,28 @@ def test_gap_of_a_run_whose_positions_are_not_numbers_is_infinite():
     """NaN would compare as smaller than every limit."""
     scene = arms(1.0)
     assert opening(scene, displaced(scene, np.full(3, np.nan), np.zeros(3))).gap == math.inf
+
+
+def test_rack_whose_pinion_turns_too_far_between_samples_has_no_known_gap():
+    """A moment turns the pinion 32 times in a second, and its rate changes between samples: without angles of
+    the run these turns are unknown, and a gap of 0 would be invented. mbref counts turns, and has no gap."""
+    scene = arms(1.0).with_(
+        joint=[
+            hinge("pin", "ground", "a", (0.0, 0.0, 0.0)),
+            {
+                "name": "rail",
+                "type": "translational",
+                "bodies": ["ground", "b"],
+                "anchor": [0.0] * 3,
+                "axis": [1.0, 0.0, 0.0],
+            },
+        ],
+        coupling=[{"name": "teeth", "joints": ["pin", "rail"], "ratio": 0.1}],
+        load=[{"type": "moment", "body": "a", "moment": [0.0, 0.0, 400.0]}],
+    )
+    run = mbref.simulate(scene, times=[0.0, 0.5, 1.0])
+    assert opening(scene, run).gap < 1e-9 and run.joint("pin").angle[-1] > 20 * np.pi
+    found, wanted = opening(scene, replace(run, angles=None)), by_closure(1e-3, scene)
+    assert found.gap == math.inf and found.uncounted == ("teeth",)
+    record = replace(run, angles=None).to_record()
+    assert wanted.measure(record) == math.inf and "coupling 'teeth'" in wanted.unknown(record)
