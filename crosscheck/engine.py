@@ -1,7 +1,5 @@
-"""The interface ``Engine`` that every engine adapter implements, and the table of the known engines.
-
-A third-party engine adapter needs to import this module only.
-"""
+"""The interface ``Engine`` of every engine adapter, and the table of the known engines. An adapter in another
+package needs to import this module only."""
 
 from __future__ import annotations
 
@@ -15,7 +13,7 @@ from importlib import import_module, metadata
 import numpy as np
 
 from crosscheck.judge.constraints import inertia_matrices, initial_poses, initial_twists
-from crosscheck.refusals import Cannot, Owner, Supports
+from crosscheck.refusals import Cannot, Owner, Supports, within_tables
 from crosscheck.setting import Alternatives, FamilyParts, Setting, best_family
 from mbref import rotations
 from mbref.motions.trajectory import Cost, Outcome, Trajectory
@@ -97,6 +95,10 @@ class Engine(ABC):
     defaults_of: Collection[str] = ()
     alternatives: Sequence[Alternatives] = ()
     compile_seconds: float = 0.0
+
+    def __init_subclass__(cls) -> None:
+        if "run" in vars(cls):
+            cls.run = within_tables(cls.run)  # type: ignore[method-assign]
 
     def version(self) -> str:
         """Return the version of the engine, of ``package`` by default; raises ImportError if missing."""
@@ -231,7 +233,7 @@ class Engine(ABC):
         ----------
         scene : Scene
         times : ndarray, shape (k,)
-            Increasing sample times, s. The first one may be 0.
+            Increasing sample times, s. The first one may be 0. A table that ends before raises SceneError.
         setting : Setting
 
         Returns
@@ -275,10 +277,8 @@ def _registered(_path: tuple[str, ...]) -> tuple[metadata.EntryPoint, ...]:
 
 
 def default_engines() -> tuple[str, ...]:
-    """Return the names of the engines that run if the user names none.
-
-    Engines that run on request only, and optional engines that are not installed, are left out.
-    """
+    """Return the names of the engines that run if the user names none: without engines that run on request
+    only, and without optional engines that are not installed."""
     asked = (name for name in engine_names() if name not in ON_REQUEST)
     return tuple(name for name in asked if name not in OPTIONAL or installed(name))
 

@@ -4,8 +4,12 @@ missing."""
 from __future__ import annotations
 
 import enum
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
+from functools import wraps
+from typing import Any
+
+import numpy as np
 
 from mbref.scene import Scene, intermittent
 
@@ -156,3 +160,14 @@ class Supports:
             for joint, kind in scene.coupled(coupling):
                 if kind not in self.couplings:
                     yield f"coupling {coupling.name!r} couples the {kind} of joint {joint.name!r}"
+
+
+def within_tables(run: Callable[..., Any]) -> Callable[..., Any]:
+    """Return an engine's ``run``, whose scene has periodic tables that reach the last sample. It raises
+    SceneError for a table that ends before."""
+
+    @wraps(run)
+    def reached(self: Any, scene: Scene, times: np.ndarray, *setting: Any, **named: Any) -> Any:
+        return run(self, scene.reaching(max(times, default=0.0)), times, *setting, **named)
+
+    return reached

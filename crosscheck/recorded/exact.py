@@ -21,7 +21,6 @@ from mbref.scene import Scene
 DENSE = 400  # least number of further times at which the exact motion is computed
 UNEVEN = 0.3  # largest fraction of a step by which a further time is moved: it shows amplitudes over 0.4 rad
 GOLDEN = (np.sqrt(5.0) - 1) / 2  # its multiples are spread evenly over fractions of one
-ROUNDED_END = 1e-12  # of an end time, by which sums of steps may miss the duration
 FINEST = 16  # multiple of DENSE at which the search for full turns between samples ends
 
 
@@ -36,13 +35,6 @@ class Exact:
     motion: Trajectory
     bound: np.ndarray
     reason: str
-
-
-def reaching_to(scene: Scene, times: np.ndarray) -> Scene:
-    """Return the scene with the last of the times (k,), s, as its end if its duration is less: periodic
-    tables repeat up to there. Raises SceneError for a table that ends before."""
-    end = times[-1] if len(times) else 0.0
-    return scene.with_(duration=float(end)) if end > scene.duration * (1 + ROUNDED_END) else scene
 
 
 def exact(scene: Scene, times: Sequence[float] | np.ndarray, seconds: float = SECONDS) -> Exact:
@@ -132,7 +124,7 @@ def reference_table(
         If the scene's velocities contradict its joints.
     """
     times = np.asarray(times, dtype=float)
-    scene = reaching_to(scene, times)
+    scene = scene.reaching(max(times, default=0.0))
     assembled, start = started(scene), start_columns(scene)
     found, columns = dense_exact(assembled, times, seconds)
     there = np.isin(found.motion.times, times)

@@ -15,7 +15,7 @@ from crosscheck.judge.start import started
 from crosscheck.judge.tolerances import FLOOR
 from crosscheck.recorded.column_errors import ColumnError, Columns, Compared, aligned
 from crosscheck.recorded.columns import kind_of, names, scales, start_columns
-from crosscheck.recorded.exact import DENSE, Exact, dense_exact, reaching_to, uncounted
+from crosscheck.recorded.exact import DENSE, Exact, dense_exact, uncounted
 from crosscheck.recorded.explanations import Explanation, with_signs
 from crosscheck.recorded.leaps import leaps, with_sides
 from crosscheck.recorded.reading import Recording, read
@@ -93,7 +93,7 @@ def judge_motion(
         If the table has no column of the scene, or the scene has no reference.
     """
     recording = _as_recording(scene, motion)
-    scene = reaching_to(scene, recording.times)
+    scene = scene.reaching(max(recording.times, default=0.0))
     recording, scene = _from_start(scene, recording), started(scene)
     sides = [t for both in leaps(scene, recording.times).values() for t in both]
     times = np.union1d(recording.times, sides)

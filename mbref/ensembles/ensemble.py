@@ -24,7 +24,6 @@ import numpy as np
 from mbref import records
 from mbref.ensembles.processes import processes
 from mbref.ensembles.simulate_all import Ended, run_all
-from mbref.equations.functions import reaching
 from mbref.method import Method, crossing_method
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
@@ -103,7 +102,7 @@ def ensemble(
             if key in known:
                 yield place, _stored(path, scene, known[key])
                 continue
-            work.add(Job(place, key, reaching(scene, float(times[-1]))))
+            work.add(Job(place, key, scene.reaching(times[-1])))
             while work.is_full() or work.has_ended():
                 yield from _handed_out(work, path)
         work.hand_over()

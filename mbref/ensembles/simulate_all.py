@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mbref.ensembles.batch import BatchResult, may_lead, run_batch
-from mbref.equations.functions import reaching
 from mbref.equations.parts import shape_of
 from mbref.method import Method
 from mbref.motions.motion import Motion
@@ -54,7 +53,7 @@ def simulate_all(
 ) -> list[Motion]:
     """Return the motions of the scenes. Each motion equals the result of ``simulate`` for the scene. Raises
     the errors of ``simulate``."""
-    scenes = [reaching(scene, float(times[-1])) for scene in scenes]
+    scenes = [scene.reaching(times[-1]) for scene in scenes]
     ended = run_all(scenes, method, times, limits)
     if ended.error:
         raise ended.error

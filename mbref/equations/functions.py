@@ -11,7 +11,6 @@ from numpy import cos, inf, sin
 from mbref.kernels.compilation import kernel
 from mbref.scene import Scene, Sine, TimeFunction
 
-ROUNDED_END = 1e-12  # of an end time, by which sums of steps may miss the duration
 AT_REST = Sine(amplitude=0.0, frequency=0.0, phase=0.0)
 
 
@@ -19,17 +18,6 @@ def functions_of(scene: Scene) -> list[TimeFunction]:
     """Return the functions of time of a scene: of drivers, then of loads if bodies have masses."""
     loads = scene.load if scene.has_mass() else ()
     return [*scene.driver, *(load.over_time for load in loads if load.over_time)]
-
-
-def reaching(scene: Scene, end: float) -> Scene:
-    """Return a scene whose tables reach an end time (s) beyond its duration: periodic ones repeat.
-
-    Raises SceneError for a table that ends before, beyond which nothing is known.
-    """
-    is_beyond = end > scene.duration * (1 + ROUNDED_END)
-    if is_beyond and any(function.table is not None for function in functions_of(scene)):
-        return scene.with_(duration=end)
-    return scene
 
 
 def numbers_of(function: TimeFunction, terms: int) -> tuple[float, ...]:

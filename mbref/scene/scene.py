@@ -21,6 +21,8 @@ from mbref.scene.stops import Stop
 from mbref.scene.toml import as_lists, read_toml, scene_text, with_lines
 from mbref.scene.validation import GROUND, SceneError, field_faults, named_paths, reference_faults
 
+ROUNDED_END = 1e-12  # of an end time, by which sums of steps may miss the duration
+
 
 class Scene(SceneEntry):
     """A mechanism: ``body``, ``joint``, ``coupling``, ``driver`` and ``load`` tuples, gravity and end time.
@@ -184,6 +186,24 @@ class Scene(SceneEntry):
         if path is not None:
             data = replaced_at(data, path, lambda _: value)
         return Scene(**{**data, **changes})
+
+    def reaching(self, end: float) -> Scene:
+        """Return a scene whose tables reach an end time beyond its duration: periodic tables repeat.
+
+        Parameters
+        ----------
+        end : float
+            End time, s.
+
+        Raises
+        ------
+        SceneError
+            If a table ends before, beyond which nothing is known.
+        """
+        loads = self.load if self.has_mass() else ()
+        functions = [*self.driver, *(load.over_time for load in loads if load.over_time)]
+        is_beyond = end > self.duration * (1 + ROUNDED_END)
+        return self.with_(duration=float(end)) if is_beyond and any(f.table for f in functions) else self
 
     def to_dict(self) -> dict[str, Any]:
         """Return the scene as the nested tables of its file; fields with default values are left out.

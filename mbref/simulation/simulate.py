@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from mbref.equations.functions import reaching
 from mbref.equations.matrices import Matrices
 from mbref.input_error import InputError
 from mbref.kernels.background import compiled_in_background
@@ -106,7 +105,7 @@ def simulate(
     if rtol is not None:
         limits = replace(limits, rtol=rtol)
     times = checked_times(np.linspace(0.0, scene.duration, SAMPLES) if times is None else times)
-    scene = reaching(scene, float(times[-1]))
+    scene = scene.reaching(times[-1])
     run = _run_of(method, formulation, stabilisation, limits)
     if not is_intermittent(scene):
         return run(scene, times, progress)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from mbref.equations.functions import reaching
 from mbref.equations.initial_state import consistent_start
 from mbref.equations.matrices import BodyFrames, Matrices, matrices_at
 from mbref.equations.model import Model
@@ -48,7 +47,7 @@ def terms(scene: Scene | str | Path, t: float = 0.0, state: GivenState | None = 
         If the state has another shape, or the motion ends before t.
     """
     (at,) = checked_times([t])
-    scene = reaching(find_scene(scene), float(at))
+    scene = find_scene(scene).reaching(at)
     model = Model(assembled(scene))
     frames = BodyFrames(model)
     if state is not None:

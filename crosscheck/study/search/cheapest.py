@@ -25,7 +25,6 @@ from crosscheck.study.search.neighbours import (
     work,
 )
 from crosscheck.study.search.selection import Family, families
-from crosscheck.study.words.text import listed
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 
@@ -63,7 +62,7 @@ def by_closure(gap: float, scene: Scene) -> Criterion:
         return opened(record, scene).gap
 
     def unknown(record: Record) -> str:
-        said = listed([f"coupling {name!r}" for name in opened(record, scene).uncounted])
+        said = ", ".join(f"coupling {name!r}" for name in opened(record, scene).uncounted)
         return f"No closure gap is known: turns of {said} between samples cannot be counted (--duration)."
 
     def text(record: Record) -> str:

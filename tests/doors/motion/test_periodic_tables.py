@@ -5,10 +5,12 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 import mbref
+from crosscheck.engine import Setting, engine
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from crosscheck.recorded.judgement import judge_motion
+from mbref import rotations
 from mbref.cli import main
 from mbref.ensembles.simulate_all import simulate_all
 from mbref.scene import Driver, Factor, JointForce, SceneError
@@ -49,6 +51,8 @@ def test_periodic_table_repeats_beyond_the_duration_in_batches_matrices_and_for_
     assert second.joint("J").rate == pytest.approx(EXACT(SAMPLES % PERIOD, 1), abs=1e-10)
     assert mbref.terms(scene, 2.5).v[5] == pytest.approx(EXACT(2.5 % PERIOD, 1), abs=1e-8)
     assert judge_motion(scene, {"time": SAMPLES, "J.angle": angle}).is_right
+    run = engine("pinocchio").run(scene, SAMPLES, engine("pinocchio").best_settings(scene)[0])
+    assert rotations.to_vector(run.orientation[:, 0])[:, 2] == pytest.approx(angle, abs=1e-12)
 
 
 def test_table_that_ends_before_the_last_time_is_refused_by_its_line(capsys, tmp_path):
@@ -59,6 +63,8 @@ def test_table_that_ends_before_the_last_time_is_refused_by_its_line(capsys, tmp
         lambda: simulate_all([scene], "taylor", SAMPLES, mbref.Limits()),
         lambda: mbref.terms(scene, 2.5),
         lambda: judge_motion(scene, {"time": SAMPLES, "J.angle": 0.0 * SAMPLES}),
+        lambda: engine("mujoco").run(scene, SAMPLES, Setting("tuned", {"step": 0.1})),
+        lambda: engine("pinocchio").run(scene, SAMPLES, Setting("tuned", {"rtol": 1e-3})),
     )
     for door in doors:
         with pytest.raises(SceneError, match=r"driver\[J\].table: leaves a gap: .* 0.8 s, .* until 2.5 s"):
