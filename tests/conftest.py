@@ -51,8 +51,7 @@ def case(item: pytest.Item) -> str:
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:
-    """Mark the cases that slow.toml lists. A pattern that begins with an exclamation mark names cases that
-    stay unmarked."""
+    """Mark the cases that slow.toml lists. A pattern that begins with "!" names cases that stay unmarked."""
     listed = [pattern for pattern in patterns(item) if fnmatchcase(case(item), pattern.removeprefix("!"))]
     if listed and not any(pattern.startswith("!") for pattern in listed):
         item.add_marker(pytest.mark.slow)

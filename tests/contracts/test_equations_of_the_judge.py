@@ -123,9 +123,8 @@ def pendulum() -> Scene:
         angular_velocity=(0.0, 0.0, 2.0),
         velocity=(0.0, 2.0, 0.0),
     )
-    return Scene(
-        name="s", body=(swung,), joint=(hinge,), load=(pull, spring), gravity=(0.0, -9.0, 0.0), duration=0.1
-    )
+    parts = {"body": (swung,), "joint": (hinge,), "load": (pull, spring)}
+    return Scene(name="s", gravity=(0.0, -9.0, 0.0), duration=0.1, **parts)
 
 
 def test_terms_of_a_pendulum_are_its_forces_mass_and_constraint_rows():

@@ -21,9 +21,8 @@ def results(run: Motion) -> list:
 def crank_with(force: tuple[float, float, float], **changes) -> Scene:
     """The planar slider-crank with a force on its rod; a force across the plane bends it out of the plane."""
     place = CRANK.body[1].position
-    return CRANK.with_(
-        load=(*CRANK.load, Force(body=CRANK.body[1].name, point=place, force=force)), **changes
-    )
+    further = Force(body=CRANK.body[1].name, point=place, force=force)
+    return CRANK.with_(load=(*CRANK.load, further), **changes)
 
 
 def rail(across: float, inertia: float = 0.02) -> Scene:

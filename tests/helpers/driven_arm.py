@@ -52,9 +52,8 @@ def driven_arm(**parts: Any) -> Scene:
     hinge = Revolute(name="hinge", bodies=("ground", "arm"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
     rail = Translational(name="rail", bodies=("arm", "block"), anchor=(1.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0))
     given = {"driver": (TURN.driver("hinge"), SLIDE.driver("rail")), **parts}
-    return Scene(
-        name="arm", body=(arm, block), joint=(hinge, rail), gravity=(0.0, -9.81, 0.0), duration=END, **given
-    )
+    given |= {"body": (arm, block), "joint": (hinge, rail)}
+    return Scene(name="arm", gravity=(0.0, -9.81, 0.0), duration=END, **given)
 
 
 def able(name: str, *scenes: Scene) -> Scene:

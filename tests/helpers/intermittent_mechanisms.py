@@ -81,9 +81,8 @@ def conditional_mechanism(seed: int) -> Scene:
     busy |= {joint.name for joint in scene.joint if joint.reflected_inertia or joint.type == "universal"}
     names = [joint.name for joint in scene.joint if joint.name not in busy]
     latch, weak = [*rng.permutation(names), None, None][:2]
-    watched = [
-        joint.name for joint in scene.joint if joint.facts.coordinates and joint.name not in (latch, weak)
-    ]
+    others = [joint for joint in scene.joint if joint.name not in (latch, weak)]
+    watched = [joint.name for joint in others if joint.facts.coordinates]
     opened = scene.with_(joint=[joint for joint in scene.joint if joint.name != latch])
     free = mbref.simulate(opened, times=[0.0, 0.05, 0.1])
     changes: dict[str | None, dict[str, Any]] = {}

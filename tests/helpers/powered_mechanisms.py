@@ -1,6 +1,5 @@
-"""Random mechanisms with all features that do work, under gravity of any direction: armatures, couplings of
-two and more coordinates, drivers, loads over time, periodic tables, springs of many turns, point masses and
-massless links."""
+"""Random mechanisms with all parts that do work: armatures, couplings of two and more coordinates, drivers,
+loads over time, periodic tables, springs of many turns, point masses and massless links."""
 
 from collections.abc import Iterator
 
@@ -85,9 +84,8 @@ def _periodic(load, rng: Rng):
         return load
     times, (a, b, c) = DURATION * (np.arange(4) / 3 - 8 / 3), rng.uniform(-1.0, 1.0, 3)
     table = tuple(zip(times.tolist(), (a, b, c, a), strict=True))
-    return load.model_copy(
-        update={"factor": load.factor.model_copy(update={"table": table, "periodic": True})}
-    )
+    factor = load.factor.model_copy(update={"table": table, "periodic": True})
+    return load.model_copy(update={"factor": factor})
 
 
 def _summed(scene: Scene, rng: Rng) -> Scene:

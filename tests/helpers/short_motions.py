@@ -25,9 +25,8 @@ def motion(maker: Callable[[], Scene]) -> Callable[[], Scene]:
 def made(name: str, bodies: list[Entry], joints: list[Entry], duration=0.3, **fields: object) -> Scene:
     """Return a scene with gravity in no special direction."""
     fields = {"gravity": GRAVITY, **fields}
-    return Scene.model_validate(
-        {"name": name, "duration": duration, "body": bodies, "joint": joints, **fields}
-    )
+    given = {"name": name, "duration": duration, "body": bodies, "joint": joints}
+    return Scene.model_validate(given | fields)
 
 
 # Each joint type carries a block on an arm that turns about a skew axis, and closes a loop on the ground.
@@ -254,11 +253,8 @@ def coupled_displacements() -> Scene:
 @motion
 def driven_gears() -> Scene:
     """Return a geared pair whose first wheel is driven; the second carries a pendulum."""
-    bodies = [
-        block("pinion", (0.0, 0.0, 0.1)),
-        block("wheel", (0.5, 0.1, 0.0)),
-        block("bob", (0.9, 0.0, 0.2), 0.4),
-    ]
+    wheels = block("pinion", (0.0, 0.0, 0.1)), block("wheel", (0.5, 0.1, 0.0))
+    bodies = [*wheels, block("bob", (0.9, 0.0, 0.2), 0.4)]
     joints = [
         hinge("A", "ground", "pinion", (0.05, 0.0, 0.0), armature=0.02),
         hinge("B", "ground", "wheel", (0.5, 0.0, 0.0)),

@@ -1,6 +1,5 @@
 """Engines that leave every body where it starts, and do one more thing that a test asks for. A child process
-finds them as ``tests.helpers.still_engines:NAME``. The variable STILL_LOG of the environment names the file
-to which they append."""
+finds them as ``tests.helpers.still_engines:NAME``. The environment variable STILL_LOG names their log."""
 
 import os
 import subprocess

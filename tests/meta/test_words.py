@@ -12,9 +12,8 @@ import pytest
 from tests.meta.imports import parsed, statements
 
 ROOT = Path(__file__).parents[2]
-FILES = [
-    path for package in ("mbref", "crosscheck", "reports") for path in sorted((ROOT / package).rglob("*.py"))
-]
+PACKAGES = ("mbref", "crosscheck", "reports")
+FILES = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
 BEGINNINGS = re.compile(r"(Have|Those|The same|Of|As|What|That|How|Whether those)\b")
 WORDS = re.compile(
     r"\b(told|tells|untold|but for|or why|those of|that of|as by|so is|beside it|dear|the other ones)\b"
@@ -25,9 +24,8 @@ CODE = re.compile(r"``.*?``|`.*?`|\"[^\"]*\"", re.S)  # names and quotations
 def docstrings(path: Path) -> Iterator[tuple[int, str]]:
     """Line and text of every docstring of a file."""
     for node in (parsed(path), *statements(path)):
-        if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module) and (
-            text := ast.get_docstring(node)
-        ):
+        has_one = isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module)
+        if has_one and (text := ast.get_docstring(node)):
             yield getattr(node, "lineno", 1), text
 
 

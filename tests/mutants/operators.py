@@ -56,9 +56,8 @@ class Mutant(NamedTuple):
     def difference(self, root: Path) -> Iterator[str]:
         """Yield the lines of the source before and after the change, as ``diff`` shows them."""
         source = (root / self.file).read_text()
-        for line in difflib.unified_diff(
-            source.splitlines(), self.planted(source).splitlines(), n=0, lineterm=""
-        ):
+        texts = source.splitlines(), self.planted(source).splitlines()
+        for line in difflib.unified_diff(*texts, n=0, lineterm=""):
             if not line.startswith(("---", "+++", "@@")):
                 yield line
 
@@ -99,11 +98,8 @@ def places(root: Path, packages: Sequence[str], mutant: Mutant) -> dict[str, int
         inner = [node.lineno for node in ast.walk(innermost) if isinstance(node, ast.stmt)]
         inner = [line for line in inner if line > mutant.line]
         return {mutant.file: _bits(innermost.lineno, min(inner) - 1 if inner else innermost.end_lineno)}
-    names = [
-        node.id
-        for node in ast.walk(innermost)
-        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
-    ]
+    inner = [node for node in ast.walk(innermost) if isinstance(node, ast.Name)]
+    names = [node.id for node in inner if isinstance(node.ctx, ast.Store)]
     if not names:
         return {mutant.file: _bits(1, len(source.splitlines()))}
     named = re.compile(rf"\b({'|'.join(names)})\b")
@@ -165,9 +161,8 @@ def _operations(node: ast.AST) -> Changes:
 
 
 def _is_text(node: ast.AST) -> bool:
-    return isinstance(node, ast.JoinedStr | ast.List) or (
-        isinstance(node, ast.Constant) and isinstance(node.value, str)
-    )
+    is_text = isinstance(node, ast.Constant) and isinstance(node.value, str)
+    return is_text or isinstance(node, ast.JoinedStr | ast.List)
 
 
 def _comparisons(node: ast.AST) -> Changes:

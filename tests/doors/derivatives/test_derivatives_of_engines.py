@@ -83,9 +83,8 @@ def test_each_faulty_gradient_fails_a_card_and_a_right_one_passes_all_cards(name
 )
 def test_cards_find_faults_of_a_body_on_a_link_without_the_judges_derivatives(card, fault):
     """NONE, without fault, satisfies an identity to rounding; a fault violates it by more than 1e-3."""
-    right, wrong = (
-        CARDS[card].check(Subject(ENGINES[name], "own"), SPATIAL[0].make()) for name in ("NONE", fault)
-    )
+    scene = SPATIAL[0].make()
+    right, wrong = (CARDS[card].check(Subject(ENGINES[name], "own"), scene) for name in ("NONE", fault))
     assert right <= 1e-11 and wrong > 1e-3
 
 
@@ -143,8 +142,8 @@ def test_command_shows_the_committed_results_or_those_of_another_file(tmp_path, 
 @pytest.mark.slow
 @pytest.mark.skipif(not installed("pinocchio"), reason="needs Pinocchio")
 def test_pinocchio_is_right_about_a_link_of_constant_length_that_its_adapter_makes_a_rod(loop, capsys):
-    """The rod has inertia about its axis, but does not spin. Six errors are by position, velocity and force,
-    each in motion and at rest."""
+    """The rod has inertia about its axis, but no spin. Errors are by position, velocity, force; in motion, at
+    rest."""
     main(["derivatives", "pinocchio", loop, "--json"])
     found = json.loads(capsys.readouterr().out)["rows"]
     judged = [row for row in found if row["truth"] == "judge" and row["function"] == "LOCAL"]
@@ -220,8 +219,7 @@ def test_mjxs_step_is_differentiated_right_and_leaves_out_a_term_of_the_exact_mo
 @pytest.mark.slow
 @pytest.mark.skipif(not installed("drake"), reason="needs Drake")
 def test_drakes_terms_hold_a_gear_pair_in_a_loop_where_derivatives_are_taken():
-    """Both cards ask for a gear pair and a cam. Drake's plant for derivatives has no constraints of its
-    own."""
+    """Both cards ask for a gear pair and a cam. Drake's plant for derivatives has no constraints."""
     found = [*verdicts(ENGINE, ["couplings, closures", "couplings, virtual work"])]
     assert [verdict.error is not None for verdict in found] == [True, False] * 2  # a cam is refused
     assert not any(verdict.fails for verdict in found)

@@ -99,9 +99,7 @@ def test_opposite_quaternions_are_one_measured_orientation():
 
 def test_angle_that_loses_full_turns_is_refused_with_its_samples():
     """The pendulum turns by 4 rad in 0.4 s, which a table between -π and π shows as 4 - 2 π = -2.28 rad."""
-    spinning = (
-        pendulum().with_("gravity", (0.0, 0.0, 0.0)).with_("body[bob].angular_velocity", (0.0, 0.0, 10.0))
-    )
+    spinning = pendulum().with_(gravity=(0.0, 0.0, 0.0)).with_("body[bob].angular_velocity", (0.0, 0.0, 10.0))
     times = np.array([0.1, 0.2, 0.3, 0.4])
     measured = {"time": times, "A.angle": np.array([1.0, 2.0, 3.0, 4.0 - 2.0 * np.pi])}
     with pytest.raises(mbref.InputError, match=r"A\.angle changes by -5\.283 rad from t = 0\.3 to 0\.4 s"):

@@ -174,8 +174,7 @@ def test_derivative_of_a_conserved_energy_stays_the_one_at_the_start():
 def test_equilibrium_of_a_pendulum_with_a_torsion_spring_moves_as_in_closed_form():
     """At rest the pendulum hangs φ below the horizontal: k φ = m g l cos φ, with k = 10 N m/rad, m = 1.3 kg
     and l = 0.5 m. So dφ/dk = -φ / D and dφ/dg = m l cos φ / D with D = k + m g l sin φ. The hinge's angle is
-    -φ, and gravity.y is -g. The hinge's force -m g_y balances the weight alone: its derivatives are 0 and
-    -m."""
+    -φ, and gravity.y is -g. The hinge's force -m g_y balances the weight: its derivatives are 0 and -m."""
     bob = body("bob", 1.3, [0.05, 0.06, 0.07], (0.5, 0.0, 0.0))
     spring = {"type": "torsion_spring", "joint": "A", "stiffness": 10.0}
     rest = mbref.equilibria(pendulum().with_(body=[bob], load=[spring]), starts=1)[0].scene

@@ -47,7 +47,6 @@ def test_scipys_integrators_reach_the_true_motion_at_a_fine_tolerance(family: st
     """Errors, of the length or rad, exceed 1e-4 at a tolerance of 1e-5, and are below 1e-7 at 1e-9."""
     from general_integrators import SCIPY
 
-    coarse, fine = (
-        error_of(SCIPY, "spatial_slider_crank_driven", Setting(family, {"rtol": r})) for r in (1e-5, 1e-9)
-    )
+    settings = (Setting(family, {"rtol": rtol}) for rtol in (1e-5, 1e-9))
+    coarse, fine = (error_of(SCIPY, "spatial_slider_crank_driven", setting) for setting in settings)
     assert fine < 1e-7 and coarse > 1e-4, (coarse, fine)

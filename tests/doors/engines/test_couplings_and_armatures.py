@@ -172,8 +172,7 @@ def test_engine_moves_a_coupling_with_offset_as_the_reference(name):
 
 
 def test_mujocos_adapter_refuses_a_scene_that_is_not_assembled():
-    """Poses of the file violate the coupling's offset. The reason names it, and the function that
-    assembles."""
+    """Poses of the file violate the coupling's offset. The reason names it, and the remedy."""
     refusal = engine("mujoco").cannot(shifted(gear_pair, "teeth", 0.4))
     assert refusal is not None
     assert refusal.reason == (

@@ -112,9 +112,8 @@ def test_a_check_that_passes_in_the_baseline_has_to_run_and_pass(right, status, 
     passed = next(v for v in right.verdicts if v.status == "pass")
     judged = before.judged(replace(passed, status=status, measured=None, reason=reason))
     assert judged.status == "fail" and judged.reason == f"{reason}; it passes in the baseline"
-    unknown = replace(
-        passed, status="outside", reason="its exact motion is not known: the CPU time has passed"
-    )
+    reason = "its exact motion is not known: the CPU time has passed"
+    unknown = replace(passed, status="outside", reason=reason)
     assert before.judged(unknown) == unknown
 
 

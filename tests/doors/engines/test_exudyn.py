@@ -47,9 +47,8 @@ def moment_of_inertia(scene: Scene) -> float:
 
 def angle(scene: Scene, trajectory: Trajectory) -> np.ndarray:
     """Return the angle (k,) about SIDEWAYS since the start, modulo a turn."""
-    relative = rotations.multiply(
-        trajectory.orientation[:, 0], rotations.conjugate(scene.body[0].orientation)
-    )
+    start = scene.body[0].orientation
+    relative = rotations.multiply(trajectory.orientation[:, 0], rotations.conjugate(start))
     return 2 * np.arctan2(relative[:, 1:] @ np.array(SIDEWAYS), relative[:, 0])
 
 

@@ -65,8 +65,8 @@ ENDS = ((0.3, 1.4, 0.1), (-0.7, 0.3, 0.2))  # m, of the spring between wheel and
 
 
 def loaded() -> Scene:
-    """Return a scene with every load of a joint, and two springs along two coordinates each; factors of two
-    loads are not 1 at t = 0."""
+    """Return a scene with every load of a joint, and two springs along two coordinates each; two loads have
+    other factors."""
     bodies = (
         body("arm", (0.5, 0.1, 0.0), (0.1, 0.2, 0.3), 1.3, angular_velocity=(0.0, 0.0, 2.0)),
         body("sled", (0.0, 1.0, 0.3), (0.4, -0.2, 0.1), 0.8, velocity=(0.3, 0.4, 0.0)),
@@ -171,8 +171,7 @@ def test_first_sample_of_an_engine_has_the_accelerations_of_gauss_s_principle(wa
 @pytest.mark.parametrize(("way", "name"), FORCED)
 def test_first_sample_of_an_engine_has_the_reactions_that_balance_every_body(way: str, name: str) -> None:
     """The exact reactions follow from Newton's and Euler's equations of each body. WAYS states the allowed
-    difference, relative to the largest reaction. Where redundant rows leave components open, only their sums
-    on bodies are compared."""
+    difference, relative to the largest reaction. Of components that redundant rows leave open sums count."""
     compared = compare(SCENES[name], exact_start(SCENES[name]), first(short_run(way, name)))
     off = [compared.resultant, *(reaction.unique for reaction in compared.joints.values())]
     assert all(each < WAYS[way][1] for each in off), off

@@ -108,8 +108,7 @@ def test_result_of_verify_on_a_failing_engine_has_the_hint(monkeypatch):
 
 
 class Geared(type(engine("mbref"))):
-    """mbref with a ``defect``: joints have ``factor`` times their armature, no coupling, or all positions are
-    given 0.1 mm aside."""
+    """mbref with a ``defect``: ``factor`` times the armatures, no coupling, or positions 0.1 mm aside."""
 
     def __init__(self, defect: str, factor=1.0):
         self.defect, self.factor = defect, factor

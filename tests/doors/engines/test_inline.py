@@ -26,9 +26,7 @@ def shaft(*kinds: str) -> Scene:
     """Return a shaft in two bearings on one axis, joints of two types."""
     body = {"name": "shaft", "mass": 2.0, "inertia": [0.1, 0.12, 0.02], "position": [0.05, 0.0, 0.4]}
     axes = [{} if kind == "spherical" else {"axis": Z} for kind in kinds]
-    bearings = [
-        joint("AB"[k], kinds[k], "ground", "shaft", (0.0, 0.0, float(k)), **axes[k]) for k in range(2)
-    ]
+    bearings = [joint("AB"[k], kinds[k], "ground", "shaft", (0.0, 0.0, k), **axes[k]) for k in range(2)]
     turning = {**body, "angular_velocity": [0.0, 0.0, 5.0]}
     return Scene(name="shaft", gravity=(-9.81, 0.0, 0.0), body=[turning], joint=bearings)
 

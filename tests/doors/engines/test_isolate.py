@@ -166,8 +166,7 @@ def test_an_engine_that_hangs_in_its_preparation_times_out(monkeypatch: pytest.M
 
 def test_the_last_line_that_an_engine_prints_in_its_preparation_is_known_meanwhile():
     """`starting` has the last line that an engine has printed while it is being prepared, and is empty
-    afterwards. The engine COMPILING prints "compiling kernels"; the first line of its run may be seen,
-    too."""
+    afterwards. The engine COMPILING prints "compiling kernels"; the first line of its run may be seen."""
     with ThreadPoolExecutor(1) as thread:
         made = thread.submit(run_in_turn, f"{FAKES}:COMPILING", still(), TIMES, PLAIN, 60.0)
         seen = set()

@@ -143,9 +143,8 @@ def chain() -> Scene:
     """Three bodies on a hinge, a universal joint and a ball, turned in space, with a weight and a force."""
     inertia = ((0.3, 0.02, 0.01), (0.02, 0.4, -0.03), (0.01, -0.03, 0.5))
     places = {"a": (0.3, 0.1, 0.2), "b": (0.8, 0.3, 0.1), "c": (1.2, 0.2, 0.5)}
-    bodies = [
-        Body(name=n, mass=1.0 + k, inertia=inertia, position=at) for k, (n, at) in enumerate(places.items())
-    ]
+    numbered = enumerate(places.items(), 1)
+    bodies = [Body(name=n, mass=k, inertia=inertia, position=at) for k, (n, at) in numbered]
     joints = [
         Revolute(name="A", bodies=("ground", "a"), anchor=(0.0, 0.0, 0.0), axis=(1.0, 2.0, 3.0)),
         Universal(name="B", bodies=("b", "a"), anchor=(0.6, 0.2, 0.1), axes=((1, 0, 1), (1, 1, -1))),

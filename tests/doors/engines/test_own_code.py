@@ -41,9 +41,8 @@ def test_shown_mjcf_and_python_set_the_options_of_a_mujoco_run(family, options):
     own = Simulation(SCENE, Setting(family, options)).model
     for name in ("timestep", "integrator", "jacobian", "iterations", "tolerance", "disableflags", "solver"):
         assert getattr(model.opt, name) == getattr(own.opt, name), name
-    assert np.allclose(model.eq_solref[0], own.eq_solref[0]) and np.allclose(
-        model.eq_solimp[0], own.eq_solimp[0]
-    )
+    for name in ("eq_solref", "eq_solimp"):
+        assert np.allclose(getattr(model, name)[0], getattr(own, name)[0]), name
     factor = options.get("hard", 1.0)
     assert np.allclose(model.body_invweight0, factor * before[0], rtol=1e-14)
     assert np.allclose(model.dof_invweight0, factor * before[1], rtol=1e-14)

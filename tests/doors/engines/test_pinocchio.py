@@ -61,9 +61,8 @@ def test_baumgarte_removes_most_of_the_drift_of_rk4() -> None:
     """Errors from the judge's truth over 0.2 s, at steps of 0.15 ms. With feedback ("baumgarte") less than
     0.3 of the error without it ("proximal") is left."""
     scene = SCENES["planar_slider_crank"]()
-    errors = {
-        f: completed_error(simulate(scene, 0.2, f, step=1.5e-4), scene) for f in ("proximal", "baumgarte")
-    }
+    runs = {family: simulate(scene, 0.2, family, step=1.5e-4) for family in ("proximal", "baumgarte")}
+    errors = {family: completed_error(run, scene) for family, run in runs.items()}
     assert errors["baumgarte"] < 0.3 * errors["proximal"], f"errors {errors}"
 
 
@@ -82,9 +81,8 @@ def test_pinocchio_follows_a_driver_exactly_at_a_loose_tolerance() -> None:
     """The sled's way is 0.5 t + 0.05 sin 7 t (m), to 1e-14 m at a tolerance of 1e-3: drivers prescribe
     coordinates of the tree and are not integrated."""
     scene = driven()
-    run = engine("pinocchio").run(
-        scene, np.linspace(0, 0.4, 5), Setting("tuned", {"rtol": 1e-3, "min_step": 1e-3})
-    )
+    loose = Setting("tuned", {"rtol": 1e-3, "min_step": 1e-3})
+    run = engine("pinocchio").run(scene, np.linspace(0, 0.4, 5), loose)
     sled = [body.name for body in scene.body].index("sled")
     axis = np.array([0.3, 1.0, 0.0]) / np.hypot(0.3, 1.0)
     moved = -(run.position[:, sled] - run.position[0, sled]) @ axis  # the ground is the second body

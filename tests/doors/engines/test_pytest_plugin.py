@@ -26,9 +26,8 @@ def held(
     command = [sys.executable, "-m", "pytest", "-q", *plugin, "--rootdir", place, *named, *options]
     found = {"PYTHONPATH": path or f"{place}{os.pathsep}{ROOT}", "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
     env, limit = {**os.environ, **found}, 300  # s
-    return subprocess.run(
-        command, cwd=place, env=env, capture_output=True, text=True, timeout=limit, check=False
-    )
+    given = {"cwd": place, "env": env, "timeout": limit}
+    return subprocess.run(command, capture_output=True, text=True, check=False, **given)
 
 
 def test_resume_repeats_no_test_that_passed_before(tmp_path):

@@ -47,9 +47,8 @@ def test_accuracy_of_a_hundredth_reduces_simbody_s_error_fivefold(family: str) -
     """Errors from the judge's truth at accuracies of 1e-4, 1e-6 and 1e-8. An accuracy without effect would
     leave the error, one to which it is proportional would reduce it a hundredfold; five is between."""
     scene = SCENES["spatial_slider_crank"]()
-    errors = [
-        completed_error(simulate(scene, 0.02, accuracy, family), scene) for accuracy in (1e-4, 1e-6, 1e-8)
-    ]
+    runs = (simulate(scene, 0.02, accuracy, family) for accuracy in (1e-4, 1e-6, 1e-8))
+    errors = [completed_error(run, scene) for run in runs]
     assert errors[1] < errors[0] / 5 and errors[2] < errors[1] / 5, f"{family}: errors {errors}"
 
 

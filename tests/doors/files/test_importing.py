@@ -132,9 +132,8 @@ def test_a_massless_link_that_carries_nothing_is_left_out_with_a_note(tmp_path):
 def test_a_root_with_three_slides_and_three_rotations_is_a_free_body(turn, tmp_path):
     """The rotations are a ball joint or three hinges. The scene has no joint, and moves as MuJoCo's model."""
     slides = "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1"))
-    text = (
-        f'<mujoco><worldbody><body name="pelvis" pos="0 0 1">{slides}{turn}{LUMP}</body></worldbody></mujoco>'
-    )
+    pelvis = f'<body name="pelvis" pos="0 0 1">{slides}{turn}{LUMP}</body>'
+    text = f"<mujoco><worldbody>{pelvis}</worldbody></mujoco>"
     found = read(tmp_path, text)
     assert not found.imported.scene.joint
     assert difference(found) < SAME

@@ -127,9 +127,8 @@ def test_each_further_attempt_to_close_a_loop_is_announced():
     said: list[str] = []
     with pytest.raises(SceneError):
         source(KINDS / "straight_without_gravity.xml", ImportOptions(say=said.append))
-    assert [text.partition(":")[0] for text in said] == [
-        f"closing the loops, attempt {k} of 4" for k in (2, 3, 4)
-    ]
+    begun = [text.partition(":")[0] for text in said]
+    assert begun == [f"closing the loops, attempt {k} of 4" for k in (2, 3, 4)]
 
 
 def joints_of(name):

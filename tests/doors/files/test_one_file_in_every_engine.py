@@ -169,9 +169,8 @@ def test_mass_matrix_and_gravity_torques_are_mujocos_at_four_poses(tmp_path: Pat
 def carried_by(joint: str) -> str:
     """Return an arm with a sprung and damped elbow on a body with a joint, under gravity."""
     elbow = '<joint name="elbow" type="hinge" axis="0 1 0" damping="0.3" stiffness="5" springref="20"/>'
-    text = model(
-        body("upper", joint + body("lower", elbow + body("hand", '<joint name="wrist" axis="1 0 0"/>')))
-    )
+    wrist = '<joint name="wrist" axis="1 0 0"/>'
+    text = model(body("upper", joint + body("lower", elbow + body("hand", wrist))))
     return text.replace("<worldbody>", '<option gravity="1 2 -9"/><worldbody>')
 
 

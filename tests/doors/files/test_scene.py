@@ -170,6 +170,5 @@ def test_joint_named_ground_is_a_fault_if_the_ground_is_a_body():
     """The ground as a body is held by a joint of this name; as a frame it has none."""
     data = changed((("joint", 1, "name"), "ground"))
     assert Scene(**data).ground == "frame"
-    assert faults_of({**data, "ground": "body"}) == [
-        "joint[ground].name: 'ground' is reserved for the fixed frame"
-    ]
+    said = "joint[ground].name: 'ground' is reserved for the fixed frame"
+    assert faults_of({**data, "ground": "body"}) == [said]

@@ -206,16 +206,13 @@ def test_driver_that_does_not_begin_at_zero_is_refused_with_its_value_in_radians
 
 def test_orientation_in_degrees_is_refused_with_the_formula_of_the_quaternion():
     """A user may take the orientation for an angle."""
-    with pytest.raises(
-        SceneError, match=r"for an angle φ about z cos\(φ/2\), 0, 0, sin\(φ/2\), got '60 deg'"
-    ):
+    with pytest.raises(SceneError, match=r"φ about z cos\(φ/2\), 0, 0, sin\(φ/2\), got '60 deg'"):
         find_scene("four_bar").with_("body[crank].orientation", "60 deg")
 
 
 @pytest.mark.parametrize("text", ["wide", "3 parsec", "30 deg", "1e999 mm", "1 2 mm"])
 def test_text_that_is_no_length_is_refused_in_a_sentence(text, snapshot):
-    """A word, numbers with an unknown unit, a unit of angle, a huge value, two numbers; the snapshot was
-    read."""
+    """A word, an unknown unit, a unit of angle, a huge value, two numbers; the snapshot was read."""
     with pytest.raises(SceneError) as caught:
         find_scene("four_bar").with_("joint[A].anchor", [text, 0.0, 0.0])
     assert caught.value.faults == snapshot
@@ -323,8 +320,7 @@ def test_command_run_refuses_a_file_with_another_ending(tmp_path, capsys):
 
 def test_command_animate_draws_the_branches_of_a_crossing_side_by_side(tmp_path, monkeypatch):
     """In 0.05 s the driven rhombus is flat twice, and has two branches at the second position: the picture of
-    the branches has a panel for each. The picture of the five-bar's first crossing, which has one branch, has
-    no second panel."""
+    the branches has a panel for each. The five-bar's first crossing has one branch, and one panel."""
     monkeypatch.chdir(tmp_path)
     assert main(["animate", "four_bar", "--duration", "0.05", "--branches"]) == 0
     picture = (tmp_path / "four_bar-branches.svg").read_text()
@@ -358,7 +354,7 @@ def test_command_animate_names_the_option_that_shows_several_branches(tmp_path, 
     ],
 )
 def test_command_animate_states_why_there_are_no_branches(words, says, tmp_path, capsys, monkeypatch):
-    """The five-bar has one branch at a quarter turn, π/2 / 124.8 s; others pass none or two, or detect
+    """The five-bar has one branch at a quarter turn, π/2 / 124.8 s; others pass two or none, or detect
     none."""
     monkeypatch.chdir(tmp_path)
     assert main(["animate", *words.split(), "--branches"]) == 2

@@ -61,9 +61,8 @@ def ring(**changes) -> Scene:
 def test_spring_acts_in_a_joint_outside_the_tree():
     """Springs act in all four joints of a ring, of which one is outside the tree. Formulation A has no tree:
     both motions are equal to 1e-15 m, and move a body by over 1 mm."""
-    springs = [
-        TorsionSpring(joint=f"P{k}", stiffness=3.0 + k, damping=0.1, natural_angle=0.2) for k in range(4)
-    ]
+    given = {"damping": 0.1, "natural_angle": 0.2}
+    springs = [TorsionSpring(joint=f"P{k}", stiffness=3.0 + k, **given) for k in range(4)]
     scene = ring(load=springs)
     assert len(spanning_tree(scene)) == 3
     times = np.linspace(0.0, 0.3, 4)

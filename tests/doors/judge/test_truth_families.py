@@ -55,17 +55,16 @@ def apart(scene, other):
     return max(off, angle)
 
 
-@pytest.mark.parametrize(
-    "name", ["planar_slider_crank_gravity", "spatial_slider_crank_gravity", "four_bar_gravity"]
-)
-def test_truth_does_not_depend_on_the_sign_of_an_axis(name):
+@pytest.mark.parametrize("kind", ["planar_slider_crank", "spatial_slider_crank", "four_bar"])
+def test_truth_does_not_depend_on_the_sign_of_an_axis(kind):
     """Axes of hinges and slides of the undriven scene are reversed; poses are equal to 1e-13 m or rad."""
 
     def flipped(joint):
         axis = getattr(joint, "axis", None)
         return joint if axis is None else joint.model_copy(update={"axis": tuple(-x for x in axis)})
 
-    assert apart(ALL[name], with_joints(ALL[name], flipped)) < ROUNDED
+    scene = ALL[f"{kind}_gravity"]
+    assert apart(scene, with_joints(scene, flipped)) < ROUNDED
 
 
 @pytest.mark.parametrize(

@@ -75,9 +75,7 @@ def changed(array: np.ndarray, sample: int, body: int, by: np.ndarray) -> np.nda
 
 GEARS, CRANK = MOTIONS["gears with armature"], MOTIONS["planar_slider_crank_gravity"]
 MAKERS = [double_hinge, flying, GEARS, CRANK]
-of_each_maker = pytest.mark.parametrize(
-    "make", MAKERS, ids=["double hinge", "flying", "gears", "slider-crank"]
-)
+of_each_maker = pytest.mark.parametrize("make", MAKERS, ids=["hinges", "flying", "gears", "slider-crank"])
 
 
 @of_each_maker
@@ -143,8 +141,7 @@ def largest_energy(scene: Scene, run: Trajectory) -> float:
 
 @pytest.mark.parametrize("share", [1e-6, 0.03])
 def test_velocities_too_fast_by_a_share_have_that_error_and_kinetic_energies_that_drift(share):
-    """Velocities (1 + s) v obey the joints. The energy T grows by ((1 + s)² - 1) T, over the largest
-    energy."""
+    """Velocities (1 + s) v obey the joints. The energy T grows by ((1 + s)² - 1) T, over the largest."""
     scene, _, exact = exact_of(double_hinge)
     faster = {name: (1 + share) * getattr(exact, name) for name in ("velocity", "angular_velocity")}
     found = measured(double_hinge, **faster)

@@ -16,7 +16,6 @@ for method in ("lm1+projection/rk4", "taylor"):
 def test_modules_of_taylor_are_loaded_only_by_runs_that_use_them():
     """A process runs another method, then taylor, and prints whether it has modules of mbref.taylor."""
     plain = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
-    ended = subprocess.run(
-        [sys.executable, "-c", RUN], env=plain, stdout=subprocess.PIPE, text=True, check=True
-    )
-    assert ended.stdout.split() == ["False", "True"]
+    words = [sys.executable, "-c", RUN]
+    printed = subprocess.check_output(words, env=plain, text=True)
+    assert printed.split() == ["False", "True"]

@@ -1,7 +1,6 @@
 """Crossed four-bars, whose flat positions every turn passes, and four-bars whose crank cannot turn in full.
-The crossed branch is smooth at a flat position, where it meets the parallel one: coupler and frame have the
-same length, so have crank and rocker, and the rocker's pin lies where two circles cross, away from the
-parallelogram."""
+The crossed branch is smooth at a flat position, where it meets the parallel one: coupler and frame are equal,
+as are crank and rocker, and the rocker's pin lies where two circles cross, away from the parallelogram."""
 
 import numpy as np
 import pytest

@@ -156,9 +156,8 @@ def test_sum_is_left_out_of_exported_mjcf_with_a_note(tmp_path, capsys):
     pair = {"name": "pair", "joints": ["A", "B"], "ratio": 2.0}
     differential(coupling=[*differential().to_dict()["coupling"], pair]).save(tmp_path / "scene.toml")
     assert main(["export", str(tmp_path / "scene.toml"), "--out", str(tmp_path / "scene.xml")]) == 0
-    assert "coupling gears: an equality of MJCF relates two joints, not 3" in " ".join(
-        capsys.readouterr().out.split()
-    )
+    said = " ".join(capsys.readouterr().out.split())
+    assert "coupling gears: an equality of MJCF relates two joints, not 3" in said
     assert 'name="pair"' in (tmp_path / "scene.xml").read_text()
 
 

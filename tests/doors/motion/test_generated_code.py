@@ -26,9 +26,8 @@ def difference(scene, method=ORDER_16, rtol=1e-11):
     """Return the largest difference of positions over 0.02 s by generated code and by the general kernels,
     over the mechanism's length. Both runs must complete."""
     times = [0.0, 0.01, 0.02]
-    generic, own = (
-        simulate(scene, method, times, Limits(rtol=rtol, code=code)) for code in ("generic", "generated")
-    )
+    limits = (Limits(rtol=rtol, code=code) for code in ("generic", "generated"))
+    generic, own = (simulate(scene, method, times, each) for each in limits)
     assert generic.outcome == own.outcome == Outcome.COMPLETED, own.message
     return np.abs(generic.position - own.position).max() / scene_length(scene)
 

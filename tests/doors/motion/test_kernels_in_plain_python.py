@@ -43,9 +43,7 @@ def states(names: Sequence[str]) -> dict[str, dict[str, list]]:
     return found
 
 
-@pytest.mark.parametrize(
-    "names", [NAMES[::4], pytest.param(NAMES, marks=pytest.mark.slow)], ids=["few", "all"]
-)
+@pytest.mark.parametrize("names", [NAMES[::4], pytest.param(NAMES, marks=pytest.mark.slow)], ids=["few", ""])
 def test_plain_and_compiled_kernels_agree_to_rounding(names):
     """Outcomes and numbers of steps are equal, and states to 100 roundings in each step and 20 more steps:
     compiled code rounds otherwise, by fused multiply-adds."""

@@ -60,8 +60,7 @@ def test_largest_step_also_bounds_fixed_steps():
 
 def test_rank_tolerance_that_drops_independent_rows_ends_as_left_motion():
     """A singular value below rank_tolerance times the largest counts as zero. With 0.1 independent rows are
-    dropped, and the motion is wrong, though it keeps the other rows; with 1e-3 it is the closed form, to ten
-    rtol."""
+    dropped, and the motion is wrong, though it keeps the other rows; with 1e-3 it is right, to ten rtol."""
     scene = slider_crank(0.304, 0.4048, 0.3, "coarse", rate=30.0).with_(gravity=(0.0, -9.81, 0.0))
     times = np.linspace(0.0, 0.5, 21)
     run = simulate(scene, "mpi-svd+projection", times, Limits(rank_tolerance=0.1))

@@ -29,9 +29,8 @@ def hip(*more: Body | Revolute) -> Scene:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_load_on_the_massless_link_of_a_gantry_swings_along_x_and_falls_along_z(method):
-    """The link slides along x on the ground, the load of 2 kg along z on the link. x swings about the
-    spring's rest at -0.2 m with ω = √(50 N/m / 2 kg) = 5 rad/s; z falls by g t² / 2; to ten rtol. METHODS
-    solve for massless bodies."""
+    """The link slides along x, and on it the load of 2 kg along z. x swings about the spring's rest at -0.2 m
+    with ω = √(50 N/m / 2 kg) = 5 rad/s; z falls by g t² / 2; to ten rtol. METHODS solve for it."""
     slides = (
         Translational(name="x", bodies=("ground", "link"), anchor=CENTRE, axis=X),
         Translational(name="z", bodies=("link", "load"), anchor=CENTRE, axis=Z),

@@ -51,8 +51,7 @@ def test_matrices_of_random_mechanisms_have_the_judges_accelerations(seed):
 )
 def test_jacobian_and_right_hand_sides_are_differences_of_the_constraints(name):
     """Columns of Φ_q = ∂Φ/∂q are differences of Φ. As d/dt (Φ_q v - ν) = Φ_q q̈ - γ, it is -γ along a motion
-    of constant velocities v. The random state violates the constraints. Φ_q agrees to CLOSE, γ to ten
-    CLOSE."""
+    of constant velocities v. The random state violates the constraints. Φ_q is so to CLOSE, γ to ten."""
     scene = MOTIONS[name]()
     rng, start = np.random.default_rng(5), mbref.terms(scene)
     n = len(start.columns)
@@ -117,9 +116,8 @@ def test_own_formulation_turns_a_gear_pair_by_its_closed_form(formulation, chart
     2 N m, J_A = 0.03 and J_B = 0.2 kg m². The moment of bearing B accelerates its wheel: r α J_B. On wheel A
     the load acts, too: α J_A - M."""
     times = np.linspace(0.0, 1.0, 5)
-    motion = mbref.simulate(
-        gear_pair(), times=times, rtol=1e-10, formulation=formulation, stabilisation=chart
-    )
+    own = {"formulation": formulation, "stabilisation": chart}
+    motion = mbref.simulate(gear_pair(), times=times, rtol=1e-10, **own)
     assert motion.outcome.name == "COMPLETED"
     assert motion.method.startswith(f"own:{formulation.__name__}+{chart}")
     rate = 2.0 / (0.03 + 0.25 * 0.2)

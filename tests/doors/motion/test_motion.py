@@ -131,9 +131,8 @@ def test_plot_without_columns_shows_joint_coordinates_and_energy(crank):
 
 def test_repr_of_a_motion_is_one_line_and_its_html_an_animation(crank):
     """Bodies and joints are shown in fewer than 80 characters. HTML has quotation marks as entities."""
-    assert repr(crank) == (
-        "<Motion of 'planar_slider_crank' by mbref taylor: COMPLETED, 21 samples to t = 0.1 s>"
-    )
+    line = "<Motion of 'planar_slider_crank' by mbref taylor: COMPLETED, 21 samples to t = 0.1 s>"
+    assert repr(crank) == line
     assert len(repr(crank["rod"])) < 80 and len(repr(crank.joint("A"))) < 80
     assert "<animate" in crank._repr_html_() and "&#x27;planar_slider_crank&#x27;" in crank._repr_html_()
 

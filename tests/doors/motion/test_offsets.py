@@ -96,9 +96,8 @@ def test_offset_moves_the_wheel_that_is_not_driven():
 
 @pytest.mark.parametrize("offset", [0.4, 8.0])
 def test_natural_angle_of_a_spring_counts_from_the_pose_in_the_file(offset):
-    """A spring of 3 N m/rad that is relaxed at the assembled start leaves the wheels at rest, also for an
-    offset of more than a turn (rad). There A is at -r J_B c / J, r = -0.5, J_B = 0.2 kg m², J = 0.08 kg m²,
-    to 0.5 % (STEPS)."""
+    """A spring of 3 N m/rad, relaxed at the assembled start, leaves the wheels at rest, also for an offset of
+    over a turn. There A is at -r J_B c / J, r = -0.5, J_B = 0.2 kg m², J = 0.08 kg m², to 0.5 % (STEPS)."""
     scene = shifted(gear_pair, "teeth", offset)
     at = mbref.simulate(scene, times=[0.0]).joint("A").angle[0]
     assert at == pytest.approx(0.5 * 0.2 / 0.08 * offset, rel=STEPS)
@@ -129,9 +128,7 @@ def test_offset_that_no_pose_obeys_is_refused():
     scene = coupled_loops().with_(
         coupling=[{"name": "g", "joints": ["left D", "right D"], "ratio": -1.0, "offset": "200 deg"}]
     )
-    with pytest.raises(
-        SceneError, match=r"coupling: no pose obeys the offsets of g \(3\.49\d*\); after \d+ %"
-    ):
+    with pytest.raises(SceneError, match=r"no pose obeys the offsets of g \(3\.49\d*\); after \d+ %"):
         mbref.simulate(scene)
 
 

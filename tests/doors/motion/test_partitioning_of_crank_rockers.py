@@ -67,9 +67,8 @@ def deviation(lengths: tuple[float, ...], angle: float, step: float) -> float:
 def test_partitioning_keeps_the_branch_and_the_energy_of_a_crank_rocker(lengths, part, step, limit):
     """The crank starts at a ``part`` of half a turn. Pin C is within the limit (m) of an intersection of the
     circles of coupler and rocker, and the energy within this relative limit of its start. The crank turns by
-    0.035 rad in the longest step, 5 ms, and errors of order 4 are 0.035⁴ = 1.5e-6. From 0.9998 the first step
-    of CHANGE_POINT passes a singular position, which multiplies them: 5.1e-5 was measured, 1e-3 is
-    allowed."""
+    0.035 rad in a step of 5 ms, and errors of order 4 are 0.035⁴ = 1.5e-6. From 0.9998 the first step of
+    CHANGE_POINT passes a singular position, which multiplies them: 5.1e-5 was measured, 1e-3 is allowed."""
     assert deviation(lengths, part * math.pi, step) < limit
 
 

@@ -117,9 +117,7 @@ def test_mjcf_keeps_the_polynomial_and_engines_without_it_refuse(tmp_path):
 
 
 @METHODS
-@pytest.mark.parametrize(
-    "law", [(0.3, 0.0, 0.0, -0.4), (1.0, -1.0, 1 / 3), LAW], ids=["end", "tangent", "LAW"]
-)
+@pytest.mark.parametrize("law", [(0.3, 0, 0, -0.4), (1.0, -1.0, 1 / 3), LAW], ids=["end", "tangent", "LAW"])
 def test_driver_of_the_follower_beyond_the_first_end_of_the_polynomial_comes_to_a_dead_position(law, method):
     """From rest q₂ = 3 t² reaches the value of P at its first q₁ with P' = 0, to 1e-9 s: no q₁ satisfies the
     coupling beyond, or, where P only has a level tangent, q₁' would be infinite."""

@@ -17,9 +17,8 @@ def flat_parallelogram(moment: float) -> Scene:
     """Two cranks of 1 m, 2 m apart, and their coupler, all on one line; a moment (N m) on a crank."""
     centres = (("left", 0.5), ("right", 2.5), ("coupler", 2.0))
     pairs = (("ground", "left"), ("ground", "right"), ("left", "coupler"), ("right", "coupler"))
-    pins = [
-        hinge(n, pair, (x, 0.0, 0.0)) for n, pair, x in zip("ADBC", pairs, (0.0, 2.0, 1.0, 3.0), strict=True)
-    ]
+    places = zip("ADBC", pairs, (0.0, 2.0, 1.0, 3.0), strict=True)
+    pins = [hinge(n, pair, (x, 0.0, 0.0)) for n, pair, x in places]
     push = Moment(body="left", moment=(0.0, 0.0, moment))
     bodies = [rod(name, (x, 0.0, 0.0), 1.0, 0.1) for name, x in centres]
     return Scene(name="flat", duration=1.0, body=bodies, joint=pins, load=(push,))

@@ -93,8 +93,7 @@ def test_joints_of_walking_legs_stay_closed_and_their_energy_constant(method):
 
 def test_links_of_a_strandbeest_have_jansens_holy_numbers():
     """The truth are Theo Jansen's published lengths (cm), by his letters of links. A link has the names of
-    its hinges; the axle O is 38.0 beside and 7.8 above each pivot Q. Masses are the lengths of rods of 1
-    kg/m."""
+    its hinges; the axle O is 38.0 beside and 7.8 above each pivot Q. Rods have 1 kg/m."""
     scene = find_scene("strandbeest[3]")
     at = {joint.name: np.array(joint.anchor)[:2] * 100 for joint in scene.joint}
     mass = {body.name: body.mass * 100 for body in scene.body}

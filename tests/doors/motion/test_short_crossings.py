@@ -61,8 +61,8 @@ def test_torsion_spring_on_a_crossing_parallelogram_moves_as_its_closed_form(rto
 @pytest.mark.parametrize("name", ("four_bar_gravity", "five_bar_gravity"))
 def test_swing_through_three_flat_positions_takes_at_most_18_steps_and_meets_the_closed_form(name):
     """At the times of the crossings the judge's closed form has all bodies on the x axis. Rounding adds a
-    pole to the series there, which must shorten no step: 18 steps are taken, rejected ones included. Errors
-    are below ten rtol."""
+    pole to the series there, which must shorten no step: 18 are taken, with rejected ones. Errors are below
+    ten rtol."""
     scene, rtol = find_scene(name), 1e-8
     times = np.linspace(0.0, scene.duration, 11)
     run = simulate(scene, "taylor[order=22]", times, Limits(rtol=rtol, code="generic"))

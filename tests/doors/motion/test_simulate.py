@@ -142,9 +142,7 @@ def test_unknown_part_of_a_method_is_refused_with_the_known_ones(name, complaint
     assert complaint in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "name", ["lm1+none/dop853", "mpi-svd+baumgarte[alpha=10,beta=3]/rk4[step=0.0012345678]"]
-)
+@pytest.mark.parametrize("name", ["lm1+none/dop853", "alf+baumgarte[alpha=10,beta=3]/rk4[step=0.0012345678]"])
 def test_name_of_a_method_is_parsed_and_printed_in_full(name):
     """Numbers keep their digits; options without names are the stabilisation's; the integrator is added."""
     assert str(Method.parse(name)) == name

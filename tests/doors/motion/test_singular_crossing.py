@@ -27,13 +27,11 @@ def error_of(scene: Scene, end: float, **limits: object) -> float:
     return relative_error(simulate(scene, "taylor", np.linspace(0.0, end, 9), Limits(**limits)), scene)
 
 
-@pytest.mark.parametrize(
-    ("rung", "allowed"), [("mass_ratio[1e+09]", 10 * RTOL), ("mass_ratio[1e+12]", 500 * RTOL)]
-)
-def test_light_crank_turns_through_dead_centres_of_a_heavy_slider(rung, allowed):
+@pytest.mark.parametrize(("ratio", "allowed"), [("1e+09", 10 * RTOL), ("1e+12", 500 * RTOL)])
+def test_light_crank_turns_through_dead_centres_of_a_heavy_slider(ratio, allowed):
     """At a dead centre rounding is magnified by the ratio of masses, 1e9 or 1e12. Errors against the judge's
     closed form are below 10 and 500 rtol: five times the largest found."""
-    scene = next(scene for scene in stability.scenes() if scene.name == rung)
+    scene = next(scene for scene in stability.scenes() if scene.name == f"mass_ratio[{ratio}]")
     assert error_of(scene, scene.duration) < allowed
 
 
@@ -53,9 +51,8 @@ def door(tilt: float, seed: int) -> Scene:
 @pytest.mark.parametrize("seed", [0, 1, 2])
 @pytest.mark.parametrize("tilt", [1e-3, 1e-5, 1e-7, 1e-8, 1e-9, 3e-10])
 def test_door_on_tilted_hinges_is_held_or_its_run_is_undecided(tilt, seed):
-    """Two hinges on different axes leave no degree of freedom. Rounding may turn a held door by the rounding
-    unit over the tilt (rad), and move it by about 1e-12 m at any tilt. Below 1e-8 rad a run may be UNDECIDED
-    at its start instead."""
+    """Two hinges on different axes leave no freedom. Rounding may turn a held door by the rounding unit over
+    the tilt (rad), and move it by about 1e-12 m at any tilt. Below 1e-8 rad a run may be UNDECIDED."""
     scene = door(tilt, seed)
     run = simulate(scene, "taylor", [0.1, 0.2])
     if tilt < 1e-8 and run.outcome.label == "UNDECIDED":

@@ -100,9 +100,8 @@ def test_slow_start_against_the_weight_is_undecided_at_its_singular_position():
     branch 2 at its crossing 1, in vain."""
     run = simulate(falling_parallelogram(0.01), "taylor", np.linspace(0.0, 1.0, 9))
     assert run.outcome.name == "UNDECIDED" and run.t_end == 0.0 and not run.times.size
-    assert run.message.endswith(
-        "at t = 0 s (taylor); neither rtol 1e-13 nor --branch 1=2 lets the motion go on"
-    )
+    said = "at t = 0 s (taylor); neither rtol 1e-13 nor --branch 1=2 lets the motion go on"
+    assert run.message.endswith(said)
 
 
 def test_message_of_an_undecided_run_also_states_the_branch_at_its_start():
@@ -160,9 +159,8 @@ def spherical_loop(crank: float, coupler: float, angle: float, rates: tuple[floa
     )
     bodies = [{**rod(name, 0.4 * place, 1.0, 0.1), "angular_velocity": rate} for name, place, rate in links]
     pairs = ((GROUND, "crank"), ("crank", "rod"), ("rod", "rocker"), (GROUND, "rocker"))
-    pins = [
-        parts.hinge(n, *pair, x, x) for n, pair, x in zip("ABCD", pairs, (first, a, c, last), strict=True)
-    ]
+    places = zip("ABCD", pairs, (first, a, c, last), strict=True)
+    pins = [parts.hinge(n, *pair, x, x) for n, pair, x in places]
     return Scene(name="spherical", gravity=(1.0, 2.0, -9.0), body=bodies, joint=pins)
 
 

@@ -103,8 +103,7 @@ def test_tilted_linkage_passes_its_singular_positions_as_its_closed_form(linkage
 def test_loop_that_a_rounded_axis_may_lock_does_not_complete(tolerance, outcome):
     """One axis is off by 2e-7 rad: rounding decides whether the loop turns or is locked, so that the run is
     UNDECIDED. With a rank tolerance above the singular value of this row it counts as redundant, and steps
-    fail. The message states the value, which is the judge's to a factor of two, as both divide rows by
-    lengths of their own."""
+    fail. The message states the value, the judge's to a factor of two, as both divide rows by own lengths."""
     scene = SCENES["planar_slider_crank_gravity"]().with_("joint[B].axis", [2e-7, 0.0, 1.0])
     run = simulate(scene, times=[0.1, 0.2], limits=Limits(rank_tolerance=tolerance, most_steps=3000))
     assert run.outcome.name == outcome

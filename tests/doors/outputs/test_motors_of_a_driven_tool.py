@@ -123,8 +123,7 @@ def test_powers_of_motors_are_the_powers_of_the_drivers_that_they_replace():
 
 def test_torques_as_tables_move_the_free_arm_along_the_circle():
     """The torques are tables of 401 rows, which move the unstable arm for 0.5 s. The spline of a torque T
-    sin(π t) at a distance h has an error of T (π h)⁴ / 384, about 2e-10 T; gravity makes it grow about a
-    hundredfold."""
+    sin(π t) at a distance h has an error of T (π h)⁴ / 384, about 2e-10 T; gravity magnifies it 100 times."""
     times, dense = np.linspace(0.0, 0.5, 6), np.linspace(0.0, DURATION, 401)
     found = mbref.inverse_dynamics(mbref.simulate(arm(), times=dense, rtol=1e-13), ["A", "E"]).motors
     rows = {n: list(zip(dense.tolist(), m.torque.tolist(), strict=True)) for n, m in found.items()}

@@ -142,8 +142,7 @@ def test_torque_is_exact_while_a_weight_bends_a_crank_that_its_rod_covers(offset
 
 
 def test_equilibrium_determines_no_torque_of_a_driver_at_a_singular_position():
-    """The slider-crank's rod is as long as its crank and lies on it at 0.25 s alone. ``open`` is then 1, not
-    0."""
+    """The slider-crank's rod is as long as its crank and lies on it at 0.25 s alone: ``open`` is 1, not 0."""
     scene = find_scene("planar_slider_crank_equal").with_(gravity=(-3.0, -G, 0.0), load=())
     scene = scene.with_(driver=[{"joint": "A", "polynomial": [0.0, 2 * np.pi]}])
     driver = simulate(scene, times=[0.0, 0.24, 0.25, 0.26]).driver("A")
