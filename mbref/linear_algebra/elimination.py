@@ -118,6 +118,15 @@ def product_of_pivots(pivots, n):
 
 
 @kernel
+def size_of_determinant(lu, n):
+    """Return the logarithm of the size of a determinant from its LU factors."""
+    size, part = 0.0, 1.0
+    for k in range(n):
+        size, part = multiplied(size, part, lu[k, k])
+    return size + log(part)
+
+
+@kernel
 def full_pivot(a, m, n, rows, columns, tolerance):
     """Eliminate a[:m, :n] with full pivoting (Gauss), in place; return the rank (Eq. 10).
 

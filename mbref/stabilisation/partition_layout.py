@@ -15,7 +15,8 @@ class Options(NamedTuple):
 
 class CoordinatePartition(NamedTuple):
     """Numbers of dependent coordinates and rates; smallest pivot of Φ_u relative to its largest, at the last
-    state, and its largest value since the partition was chosen."""
+    state, and its largest value since the partition was chosen. With rows between velocities, the logarithm
+    of the product of all pivots takes its place."""
 
     rank: int = 0
     pivot: float = 0.0

@@ -15,18 +15,19 @@ the run is at a singular position.
 
 Rows between velocities alone, as of a wheel that does not slip, leave fewer independent rates than
 independent coordinates.  Then the rates have a partition of their own, of all rows: y contains independent
-coordinates and independent rates, and all other rates follow from these.
+coordinates and independent rates, and all other rates follow from these. A wheel turns fast, and its pivots
+vanish while others are smaller; so partitions are compared by the products of all pivots.
 """
 
 from __future__ import annotations
 
-from numpy import inf
+from numpy import inf, log
 
 from mbref.equations.coordinates import coordinate_rates, copy_state
 from mbref.equations.evaluation import assemble_system, evaluate
 from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import ACCEPT, CHANGED, ENTER, NOT_CONVERGED, OK, RATES, SINGULAR_AHEAD
-from mbref.linear_algebra.elimination import full_pivot, lu_of_chosen, lu_solve
+from mbref.linear_algebra.elimination import full_pivot, lu_of_chosen, lu_solve, size_of_determinant
 from mbref.linear_algebra.vectors import copy
 from mbref.stabilisation.base import Stabilisation
 from mbref.stabilisation.euler_parameter_rates import (
@@ -72,7 +73,7 @@ def choose_coordinates(memory):
     if velocity_rows.shape[0] > 0:
         choose_rates(memory)
     memory.loop.clock.y_size = 2 * q.shape[0] - rank - scratch.partition.rate_rank
-    scratch.partition.largest_pivot = 0.0
+    scratch.partition.largest_pivot = -inf
 
 
 @kernel
@@ -136,7 +137,8 @@ def factorise_dependent(memory):
 @kernel
 def factorise_rates(memory):
     """Compute LU factors of the dependent rates at the state of the last evaluation, if they have a partition
-    of their own; return False if they are singular. The smaller relative pivot of both partitions counts."""
+    of their own; return False if they are singular. ``pivot`` is then the logarithm of the product of all
+    pivots."""
     if memory.equations.scene.velocity_rows.shape[0] == 0:
         return True
     scratch, partition = scratch_of(memory.chart), scratch_of(memory.chart).partition
@@ -144,9 +146,19 @@ def factorise_rates(memory):
     memory.equations.system.counts.factorisations += 1
     lu, exchanges = scratch.dependent_rates, scratch.rate_exchanges
     chosen = scratch.rate_row_order, scratch.rate_column_order, partition.rate_rank
-    pivot = lu_of_chosen(scratch.jacobian, chosen, lu, exchanges, SINGULAR_DEPENDENT)
-    partition.pivot = min(partition.pivot, pivot)
-    return pivot > 0.0
+    if lu_of_chosen(scratch.jacobian, chosen, lu, exchanges, SINGULAR_DEPENDENT) == 0.0:
+        return False
+    partition.pivot = size_of_determinant(lu, partition.rate_rank)
+    partition.pivot += size_of_determinant(scratch.dependent, partition.rank)
+    return True
+
+
+@kernel
+def is_smaller(pivot, factor, other, memory):
+    """Return whether a pivot is smaller than a factor times another one; see ``factorise_rates``."""
+    if memory.equations.scene.velocity_rows.shape[0] == 0:
+        return pivot < factor * other
+    return pivot < log(factor) + other
 
 
 @kernel
@@ -250,7 +262,7 @@ def accept(t, y, memory):
     memory.watch.accepted_time = t
     partition = scratch_of(memory.chart).partition
     partition.largest_pivot = max(partition.largest_pivot, partition.pivot)
-    if partition.pivot < options_of(memory.chart_options).kept * partition.largest_pivot:
+    if is_smaller(partition.pivot, options_of(memory.chart_options).kept, partition.largest_pivot, memory):
         rank, rate_rank = partition.rank, partition.rate_rank
         replaced = replace_partition(memory)
         if partition.rank < rank or partition.rate_rank < rate_rank:
@@ -276,7 +288,7 @@ def replace_partition(memory):
         return True
     factorise_dependent(memory)
     factorise_rates(memory)
-    if pivot < BETTER * partition.pivot:
+    if is_smaller(pivot, BETTER, partition.pivot, memory):
         return True
     copy(scratch.last_row_order, scratch.row_order)
     copy(scratch.last_column_order, scratch.column_order)
