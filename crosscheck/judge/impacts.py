@@ -54,7 +54,11 @@ def impact(after: Scene, state: State) -> Impact:
 
 def pushing(after: Scene, state: State, gaps: np.ndarray, least: np.ndarray) -> np.ndarray:
     """Return which gaps (e,), with rows (e, 6 nb) in the twists, have impulses where an impact leaves rates
-    of at least ``least`` (e,): the change of twists is then the least one, and no impulse pulls."""
+    of at least ``least`` (e,): the change of twists is then the least one, and no impulse pulls.
+
+    Least distance programming by non-negative least squares (Lawson & Hanson, Solving Least Squares Problems,
+    1974, ch. 23), which holds for dependent gaps, too.
+    """
     rows, _ = jacobian(after, 0.0, state.position, state.orientation)
     mass, _ = _mass_matrix(after, state)
     scaled, units, _ = unit_rows(after, rows)
@@ -66,9 +70,9 @@ def pushing(after: Scene, state: State, gaps: np.ndarray, least: np.ndarray) -> 
     after_joints = impact(after, state).state
     twists = np.hstack([after_joints.velocity, after_joints.angular_velocity]).ravel()
     lacking = (least - gaps @ twists) / sizes
-    return np.asarray(
-        nnls(pushes / sizes, np.linalg.lstsq((pushes / sizes).T, lacking, rcond=RANK)[0])[0] > 0
-    )
+    largest = np.abs(lacking).max()
+    rows = np.vstack([pushes / sizes, lacking / (largest if largest > 0.0 else 1.0)])
+    return np.asarray(nnls(rows, np.eye(len(rows))[-1])[0] > 0)
 
 
 def _mass_matrix(scene: Scene, state: State) -> tuple[np.ndarray, Reflected]:

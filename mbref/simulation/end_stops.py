@@ -7,8 +7,10 @@ held there by a row while the force of this row pushes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from itertools import combinations, islice
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +31,7 @@ GAP_CLOSED = 1e-12  # gap (lengths of the mechanism, or rad) of a coordinate at 
 GAP_ROUNDED = 1e-14  # gap (lengths, or rad) that rounding may leave in a motion
 AT_REST_RATE = 1e-12  # rate of a gap / largest rate before the impact that rounding may leave
 LOOK = 1e-6  # time after an event / end time, at which the force of a contact has its sign
+MOST_CHOICES = 1000  # of stops that act together; each takes milliseconds
 CHATTER = 1e-6  # flight between two impacts / end time, below which the coordinate stays at its end
 
 
@@ -149,11 +152,12 @@ class EndStops:
         """Return the impact of least change after which gaps have at least given rates, other gaps zero.
 
         Stops whose impulses would pull take none; their coordinates leave faster. The first stop against this
-        changes, which ends for independent stops (Murty, Opsearch 11, 1974).
+        changes, which ends for independent stops (Murty, Opsearch 11, 1974). Of others, as of geared joints,
+        the fewest that suffice act. Raises SceneError if none suffice.
         """
         least = dict.fromkeys(touching, 0.0) | dict(wanted)
-        acting, tried = {*wanted}, set[frozenset[Side]]()
-        while True:
+
+        def attempt(acting: Collection[Side]) -> tuple[Impact, Side | None]:
             held = [side for side in least if side in acting]
             driven = [Driver(joint=s.joint, polynomial=(0.0, -s.sign * least[s])) for s in held]
             found = impact(before, after.with_(driver=[*after.driver, *driven]))
@@ -163,10 +167,29 @@ class EndStops:
                 for s in least
                 if (s in pulling if s in acting else self._rate(s, state, found) < least[s] - still)
             )
-            tried.add(frozenset(acting))
-            if (first := next(wrong, None)) is None or acting ^ {first} in tried:
-                return found
-            acting ^= {first}
+            return found, next(wrong, None)
+
+        acting, tried, fault = frozenset(wanted), set[frozenset[Side]](), None
+        try:
+            while acting not in tried:
+                found, wrong = attempt(acting)
+                if wrong is None:
+                    return found
+                tried.add(acting)
+                acting ^= {wrong}
+        except SceneError as contradiction:
+            if not acting:
+                raise
+            fault = contradiction
+        choices = (some for size in range(len(least)) for some in combinations(least, size))
+        for some in islice(choices, MOST_CHOICES):
+            with suppress(SceneError):
+                other, wrong = attempt(some)
+                if wrong is None:
+                    return other
+        if fault:
+            raise fault
+        return found
 
     def _pulling(self, held: Sequence[Side], found: Impact) -> list[Side]:
         """Return the sides, whose drivers are the last ones of an impact, with impulses that pull."""

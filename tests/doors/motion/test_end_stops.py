@@ -303,3 +303,21 @@ def test_stop_that_is_met_with_another_one_does_not_pull():
     assert event.stops == ("A.upper", "B.lower") and event.contacts == ("A.upper",)
     assert np.abs(event.angular_velocity_after[:, 2] - [0.0, 0.815 / 0.35]).max() <= SOLVED
     assert measure(scene, motion, None)["impact_error"] <= ROUNDED
+
+
+@pytest.mark.parametrize("restitutions", [(0.5, 0.2), (0.2, 0.5)])
+def test_geared_stops_that_are_met_at_once_rebound_by_the_larger_restitution(restitutions):
+    """Rotors at 2 and -4 rad/s, geared by -2, meet ends at 1 and -2 rad. Each rate after it is at least -e
+    times its own before, so that both turn back with 0.5 of their rates, by mbref and by the judge."""
+    rates, limits = (2.0, -4.0), ({"upper": 1.0}, {"lower": -2.0})
+    at = {name: (float(k), 0.0, 0.0) for k, name in enumerate("ab")}
+    spins = dict(zip("ab", ((0.0, 0.0, rate) for rate in rates), strict=True))
+    bodies = [body(n, 1.0, [0.1] * 3, at[n], angular_velocity=spins[n]) for n in "ab"]
+    stops = [{**end, "restitution": e} for end, e in zip(limits, restitutions, strict=True)]
+    hinges = [hinge(n.upper(), "ground", n, at[n], Z, stop=s) for n, s in zip("ab", stops, strict=True)]
+    gears = {"name": "gears", "joints": ["A", "B"], "ratio": -2.0}
+    scene = Scene(name="gears", duration=0.6, body=bodies, joint=hinges, coupling=[gears])
+    motion = mbref.simulate(scene, "taylor", times=[0.0, 0.6])
+    assert motion.events[0].stops == ("A.upper", "B.lower")
+    for found in (motion, motion_by(natural_motion, scene, [0.0, 0.6], EXTENDED)):
+        assert np.abs(doubles(found.angular_velocity)[-1, :, 2] + 0.5 * np.array(rates)).max() <= SOLVED
