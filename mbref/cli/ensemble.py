@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mbref.cli.output import STATE, body_table, console, progress_bar, rounded, warn
+from mbref.cli.output import STATE, body_table, console, largest_numbers, progress_bar, rounded, warn
 from mbref.cli.request import MOST_STATES, add_method_options, add_scene, limits_of, sample_times
 from mbref.command_line import record_file, whole
 from mbref.input_error import InputError
@@ -124,8 +124,9 @@ def _early_ends(runs: Mapping[int, Trajectory]) -> Iterator[str]:
 
 def _table(scene: Scene, end: float, last: dict[str, np.ndarray]) -> Any:
     def cells(b: int, field: str) -> list[str]:
-        mean, deviation = (rounded(f(last[field][:, b], axis=0)) for f in (np.mean, np.std))
+        mean, deviation = (rounded(field, f(last[field][:, b], axis=0), largest) for f in (np.mean, np.std))
         return [f"{m:.5g}\n± {d:.2g}" for m, d in zip(mean, deviation, strict=True)]
 
     names = [body.name for body in scene.body]
+    largest = largest_numbers(last, end)
     return body_table(f"mean ± standard deviation at t = {end:g} s", names, cells)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mbref.motions.output_units import unit_of_column
+from mbref.motions.outputs import UNIT_OF, quantity_of
 from mbref.scene import Scene
 from mbref.scene.slips import probable_slips
 from mbref.terminal import Console
@@ -24,6 +25,15 @@ CELL_FRAME = 3  # characters of a cell beside its text: two blanks and a line
 PIPED_WIDTH = 80  # characters of a line without a terminal
 HOUR = 3600.0  # s
 PAUSE = 10.0  # s between two progress lines if stderr is no terminal
+NOISE = 1e-12  # of the largest number of a unit; smaller numbers are rounding errors of zeros
+PRODUCTS = (  # unit, and two units whose numbers make one of the unit when multiplied
+    ("m/s", "m", "1/s"),
+    ("rad/s", "rad", "1/s"),
+    ("m/s²", "m/s", "1/s"),
+    ("rad/s²", "rad/s", "1/s"),
+    ("N m", "N", "m"),
+    ("W", "J", "1/s"),
+)
 STATE = ("position", "velocity", "angular_velocity")  # of a body in a table; fields of a trajectory
 
 
@@ -51,9 +61,26 @@ def exit_status(motions: Mapping[str, Motion]) -> int:
     return 1 if ended else 0
 
 
-def rounded(vector: np.ndarray) -> np.ndarray:
-    """Return a vector in which rounding errors of zeros are zero, for printing."""
-    return np.round(vector, 12) + 0.0
+def largest_numbers(columns: Mapping[str, np.ndarray], end: float) -> dict[str, float]:
+    """Return the largest absolute number of each unit among columns (…) of a motion up to an end time (s).
+
+    A rate counts as at least 1 rad, or the largest length, in this time; a moment as the largest force times
+    the largest length, a power as the largest energy in this time.
+    """
+    found = {"rad": 1.0, "1/s": 1.0 / end if end > 0.0 else 0.0, "": 1.0}
+    for name, values in columns.items():
+        unit = "s" if name == "time" else UNIT_OF[quantity_of(name)]
+        found[unit] = np.max(np.abs(values), initial=found.get(unit, 0.0), where=np.isfinite(values))
+    for unit, first, second in PRODUCTS:
+        found[unit] = max(found.get(unit, 0.0), found.get(first, 0.0) * found.get(second, 0.0))
+    return found
+
+
+def rounded(name: str, values: np.ndarray, largest: Mapping[str, float]) -> np.ndarray:
+    """Return numbers of a column of a name, for printing: those below NOISE of the ``largest_numbers`` of
+    their unit are zero."""
+    noise = NOISE * largest["s" if name == "time" else UNIT_OF[quantity_of(name)]]
+    return np.where(np.abs(values) <= noise, 0.0, values)
 
 
 def body_table(
@@ -89,16 +116,20 @@ class _Numbers(NamedTuple):
 
 
 def column_tables(
-    columns: Mapping[str, np.ndarray], units: Sequence[str] = (), width: int = PIPED_WIDTH
+    columns: Mapping[str, np.ndarray],
+    largest: Mapping[str, float],
+    units: Sequence[str] = (),
+    width: int = PIPED_WIDTH,
 ) -> Iterator[Table]:
     """Yield tables of numbers over time that fit into ``width`` characters, with no number broken.
 
-    Each of the named columns (k,) is in one table; the time, the first of them, is in all.
+    Each of the named columns (k,) is in one table; the time, the first of them, is in all. ``largest`` are
+    the ``largest_numbers`` of the motion.
     """
     shown = []
     for name, values in columns.items():
         unit, size = unit_of_column(name, units)
-        numbers = values if name.endswith(SMALL_COLUMNS) else rounded(values) / size
+        numbers = values if name.endswith(SMALL_COLUMNS) else rounded(name, values, largest) / size
         shown.append(_Numbers(f"{name}\n{unit}", [f"{x:.6g}" for x in numbers]))
     if _width(shown) > width:
         shown = [column._replace(title=column.title.replace(".", "\n.")) for column in shown]

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbref.cli.motors import add_motors, motion_by
-from mbref.cli.output import body_table, column_tables, console, progress_bar, rounded
+from mbref.cli.output import STATE, body_table, column_tables, console, largest_numbers, progress_bar, rounded
 from mbref.cli.request import add_method_options, add_scene, add_units, request_of
 from mbref.command_line import add_output
 from mbref.input_error import InputError
 from mbref.motions.motion import Motion
 from mbref.motions.output_units import requested_units, unit_of_column
-from mbref.motions.outputs import UNIT_OF
+from mbref.motions.outputs import UNIT_OF, chosen
 from mbref.records import strict_json
 from mbref.scene import Scene
 from mbref.scene.bodies import DRIVER
@@ -175,16 +175,20 @@ def show(
     if with_maxima:
         out.print(_maxima_table(trajectory, units))
     if columns:
-        for table in column_tables(trajectory.columns(*columns), units, out.width):
+        table_of_all = trajectory.columns()
+        shown = {name: table_of_all[name] for name in ["time", *chosen(table_of_all, columns)]}
+        largest = largest_numbers(table_of_all, trajectory.t_end)
+        for table in column_tables(shown, largest, units, out.width):
             out.print(table)
         for sentence in _undetermined(trajectory, columns):
             out.print(sentence)
         return
 
+    largest = largest_numbers({field: getattr(trajectory, field) for field in STATE}, trajectory.t_end)
+
     def numbers(b: int, field: str) -> list[str]:
-        return [
-            f"{x:.5g}" for x in rounded(getattr(trajectory, field)[-1, b]) / unit_of_column(field, units)[1]
-        ]
+        values = rounded(field, getattr(trajectory, field)[-1, b], largest)
+        return [f"{x:.5g}" for x in values / unit_of_column(field, units)[1]]
 
     out.print(body_table(f"state at t = {trajectory.times[-1]:g} s", trajectory.bodies, numbers, units))
 
@@ -200,9 +204,15 @@ def _maxima_table(motion: Motion, units: Sequence[str]) -> Table:
     for quantity, (unit, _) in zip(quantities, forms, strict=True):
         table.add_column(f"{quantity}\n{unit}", justify="right")
     table.add_column("open", justify="right")
-    for name, found in motion.reaction_maxima().items():
-        values = rounded(np.array(found[:4])) / [size for _, size in forms]
-        table.add_row(name, *(f"{x:.6g}" for x in values), str(found.open))
+    maxima = motion.reaction_maxima()
+    columns = {"force": [each.force for each in maxima.values()], "position": motion.position}
+    largest = largest_numbers({name: np.array(values) for name, values in columns.items()}, motion.t_end)
+    for name, found in maxima.items():
+        moment = float(rounded("moment", np.array(found.moment), largest))
+        values = (found.force, found.force_time, moment, found.moment_time)
+        table.add_row(
+            name, *(f"{x / size:.6g}" for x, (_, size) in zip(values, forms, strict=True)), str(found.open)
+        )
     return table
 
 

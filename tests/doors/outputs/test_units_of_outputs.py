@@ -19,12 +19,14 @@ SIZES = {  # unit of an output → its size in SI, by "mm,deg,kN,ms"
 }
 
 
-def crank(rate=RATE):
-    """A mass on a crank that turns once a second, level at the start, in the plane of gravity."""
+def crank(rate=RATE, size=1.0):
+    """A mass on a crank of ``size`` that turns once a second, level at the start, in the plane of gravity."""
     return mbref.Scene(
         name="crank",
         gravity=(0, -G, 0),
-        body=[{"name": "mass", "mass": MASS, "inertia": [0, 0, 0], "position": [RADIUS, 0, 0]}],
+        body=[
+            {"name": "mass", "mass": MASS * size**3, "inertia": [0, 0, 0], "position": [RADIUS * size, 0, 0]}
+        ],
         joint=[joint("A", "revolute", "ground", "mass", axis=Z)],
         driver=[{"joint": "A", "polynomial": [0, rate]}],
     )
@@ -93,14 +95,18 @@ def test_largest_reaction_of_a_crank_is_at_the_bottom(motion):
     assert found.moment_time in (0.0, 0.5, 1.0)
 
 
-def test_command_prints_largest_reactions_and_their_times_in_the_requested_units(tmp_path, capsys):
-    """Printed are the crank's moment m g r in N mm, and its force m (ω² r + g) in N at 750 ms."""
-    crank().save(tmp_path / "crank.toml")
+@pytest.mark.parametrize("size", [1.0, 1e-6])
+def test_command_prints_largest_reactions_and_their_times_in_the_requested_units(size, tmp_path, capsys):
+    """Printed are the crank's moment m g r in N mm, and its force m (ω² r + g) in N at 750 ms; at the start
+    the driver's power is m g r ω. A crank of micrometres has no number that counts as a rounding error."""
+    crank(size=size).save(tmp_path / "crank.toml")
     command = ["run", str(tmp_path / "crank.toml"), "--samples", "9", "--maxima", "--units", "N mm,mm,ms"]
-    assert main(command) == 0
+    assert main([*command, "--columns", "driver(A).power", "mass.position.z"]) == 0
     shown = capsys.readouterr().out
-    force = MASS * (RATE**2 * RADIUS + G)
-    assert f"{1000 * MASS * G * RADIUS:.6g}" in shown and f"{force:.6g} │  750 " in shown
+    mass, radius = MASS * size**3, RADIUS * size
+    force = mass * (RATE**2 * radius + G)
+    assert f"{1000 * mass * G * radius:.6g}" in shown and f"{force:.6g} │  750 " in shown
+    assert f"│  0 │ {mass * G * radius * RATE:.6g} │".replace(" ", "") in shown.replace(" ", "")
 
 
 def test_plot_over_the_angle_of_a_driver_has_the_columns_as_curves(motion):
