@@ -7,6 +7,7 @@ A process receives several runs in one call, because scenes of equal structure a
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import itertools
 import json
@@ -100,7 +101,7 @@ def ensemble(
         for place, scene in enumerate(scenes):
             key = _key(scene, times, method, limits) if path else ""
             if key in known:
-                yield place, _stored(path, scene, known[key])
+                yield place, _stored(path, scene, times, known[key])
                 continue
             work.add(Job(place, key, scene.reaching(times[-1])))
             while work.is_full() or work.has_ended():
@@ -112,15 +113,27 @@ def ensemble(
         work.cancel()
 
 
-def _stored(path: str | Path | None, scene: Scene, record: dict[str, Any]) -> Trajectory:
-    """Return the motion of a record; raises RecordsError if it is damaged."""
-    try:
-        return Trajectory.from_record(scene.name, record)
-    except records.BROKEN:
+def _stored(path: str | Path | None, scene: Scene, times: np.ndarray, record: dict[str, Any]) -> Trajectory:
+    """Return the motion of a record, its bodies in the scene's order; raises RecordsError if it is
+    damaged."""
+    found = None
+    with contextlib.suppress(*records.BROKEN):
+        bodies = {body.name: record["bodies"][body.name] for body in scene.body}
+        found = Trajectory.from_record(scene.name, {**record, "bodies": bodies})
+    if found is None or not _is_result(found, times):
         key = record["key"][:12]
         raise records.RecordsError(
             f"{path}: record {key!r}: is no result of a run; remove this line, or the file"
-        ) from None
+        )
+    return found
+
+
+def _is_result(run: Trajectory, times: np.ndarray) -> bool:
+    """Return whether a run has finite states at the first of the times, and at all if it completed."""
+    states = (run.position, run.orientation, run.velocity, run.angular_velocity)
+    is_whole = run.times.size == times.size or run.outcome is not Outcome.COMPLETED
+    are_first = np.array_equal(run.times, times[: run.times.size])
+    return is_whole and are_first and all(np.isfinite(state).all() for state in states)
 
 
 class Job(NamedTuple):

@@ -15,6 +15,7 @@ import pytest
 from mbref.cli import main
 from mbref.ensembles.ensemble import ensemble
 from mbref.ensembles.processes import processes
+from mbref.records import RecordsError
 from mbref.scene import Scene, SceneError
 from mbref.scene.variation import Variation, variants
 from mbref.scenes import SCENES
@@ -73,6 +74,23 @@ def test_stored_run_is_read_from_the_file_only_for_equal_limits_and_times(tmp_pa
     assert fine.cost.rhs > rough.cost.rhs, (fine.cost, rough.cost)
     assert len(short.times) == 2 and again.position.tolist() == rough.position.tolist()
     assert len(path.read_text().splitlines()) == 3
+
+
+def test_stored_bodies_are_read_by_name_and_a_completed_run_without_its_last_sample_is_refused(tmp_path):
+    """Tools such as ``jq -S`` sort the names in a file: coupler, crank, rocker; the scene begins with the
+    crank. A record whose samples were cut has another last state, and would enter the mean."""
+    path, scene = tmp_path / "runs.jsonl", SCENES["four_bar"]()
+    with ThreadPoolExecutor(1) as one:
+        [(_, run)] = ensemble([scene], TIMES, METHOD, LIMITS, one, path)
+        record = json.loads(path.read_text())
+        path.write_text(json.dumps(record, sort_keys=True) + "\n")
+        [(_, again)] = ensemble([scene], TIMES, METHOD, LIMITS, one, path)
+        assert again.bodies == run.bodies and again.position.tolist() == run.position.tolist()
+        for values in (record, *record["bodies"].values(), record["reactions"], record["angles"]):
+            values |= {key: rows[:2] for key, rows in values.items() if isinstance(rows, list)}
+        path.write_text(json.dumps(record | {"open_reactions": None}) + "\n")
+        with pytest.raises(RecordsError, match="is no result of a run; remove this line"):
+            list(ensemble([scene], TIMES, METHOD, LIMITS, one, path))
 
 
 def test_another_process_reports_all_faults_of_a_scene():
