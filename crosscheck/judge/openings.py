@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
 from crosscheck.judge import constraints
+from crosscheck.judge.events import parts
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 
@@ -27,9 +29,17 @@ class Opening(NamedTuple):
 
 
 def opening(scene: Scene, run: Trajectory) -> Opening:
-    """Return the largest openings of a run, whose bodies are in the scene's order; drivers do not count."""
-    if not len(run.times):
+    """Return the largest openings of a run, whose bodies are in the scene's order; drivers do not count, nor
+    joints while they do not hold."""
+    found = [_of_piece(piece, own) for piece, own, _ in parts(scene, run, None) if len(own.times)]
+    if not found:
         return Opening(math.inf, math.inf)
+    gaps, angles, uncounted = zip(*found, strict=True)
+    return Opening(max(gaps), max(angles), tuple(dict.fromkeys(chain.from_iterable(uncounted))))
+
+
+def _of_piece(scene: Scene, run: Trajectory) -> Opening:
+    """Return the largest openings of a run in which all joints hold."""
     pose = (run.times, run.position, run.orientation)
     with np.errstate(all="ignore"):  # states that are not finite are reported, without warnings
         residuals = constraints.closure(scene.with_(driver=()), *pose)

@@ -65,6 +65,8 @@ def plot(
     across, *others = chosen(columns, [over])
     if others:
         raise InputError(f"over: must be one column, such as {across!r}, got {over!r}")
+    if missing := [label for label, table in tables.items() if across not in table]:
+        raise InputError(f"over: motion {missing[0]!r} has no column {across!r}")
     panels = grouped(
         [name for name in columns if name != "time" and (names or name != across)], names, together
     )
