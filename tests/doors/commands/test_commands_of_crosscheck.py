@@ -73,16 +73,14 @@ def test_json_of_a_run_has_the_fields_of_a_record_and_the_engines_states(capsys,
         assert record["metrics"], "no metric"
 
 
-def two_blocks(folder: Path) -> str:
-    """Save a scene of two bodies at rest, of which no closed form is known."""
-    return saved(folder, "two", body=[rod(n, (1.0, y, 3.0), inertia=1.0) for n, y in (("a", 0), ("b", 2.0))])
-
-
 @pytest.fixture
 def two(tmp_path, monkeypatch) -> tuple[str, ...]:
-    """Arguments of `run` with a scene without a closed form, and an empty cache of references."""
+    """Arguments of `run` with two bodies at rest, without a closed form, and an empty cache of references."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    return ("run", two_blocks(tmp_path), "--engine", FAKE, "--setting", "plain", "--samples", "3")
+    path = saved(
+        tmp_path, "two", body=[rod(n, (1.0, y, 3.0), inertia=1.0) for n, y in (("a", 0), ("b", 2.0))]
+    )
+    return ("run", path, "--engine", FAKE, "--setting", "plain", "--samples", "3")
 
 
 def test_a_scene_without_a_closed_form_is_judged_by_its_reference(capsys, two):

@@ -56,16 +56,17 @@ def test_chain_of_too_many_loops_is_refused_and_not_written(
 STATES = 10_000_000  # largest number of samples times bodies of runs, which take about 2 GB
 
 
-def test_samples_of_more_states_than_memory_holds_are_refused_with_the_largest_number(capsys):
-    """The chain has 201 bodies."""
-    assert main(["run", "four_bar_chain[100]", "--samples", "1000000"]) == 2
-    assert f"--samples: must be at most {STATES // 201} for 201 bodies" in capsys.readouterr().err
-
-
-def test_ensemble_of_more_states_than_memory_holds_is_refused_with_the_largest_count(capsys):
-    """A four-bar has three bodies, and a run 101 samples."""
-    assert main(["ensemble", "four_bar", "--vary", "gravity[1]=0:1", "--count", "1000000"]) == 2
-    assert f"--count: must be at most {STATES // (3 * 101)}" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("run four_bar_chain[100] --samples", f"{STATES // 201} for 201 bodies"),
+        ("ensemble four_bar --vary gravity[1]=0:1 --count", f"{STATES // (3 * 101)}"),
+    ],
+)
+def test_more_states_than_memory_holds_are_refused_with_the_largest_number(words, says, capsys):
+    """The chain has 201 bodies; a four-bar has three, and a run of an ensemble 101 samples."""
+    assert main([*words.split(), "1000000"]) == 2
+    assert f"{words.split()[-1]}: must be at most {says}" in capsys.readouterr().err
 
 
 def test_full_matrix_beyond_the_memory_of_the_machine_is_refused_with_its_size():

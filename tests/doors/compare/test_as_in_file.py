@@ -265,14 +265,11 @@ def test_reading_a_file_reports_parts_left_out_and_closed_loops(tmp_path):
     assert any("closure 'C' was open by" in sentence for sentence in said)
 
 
-def test_a_missing_file_is_refused_by_its_name(tmp_path):
-    with pytest.raises(RequestError, match=r"none\.xml"):
-        find_scenes([str(tmp_path / "none.xml")])
+XACRO = r"no format reads .xacro; known: .*; write a URDF with `xacro FILE"
 
 
-def test_a_xacro_file_is_refused_with_the_command_that_expands_it(tmp_path):
-    (tmp_path / "robot.urdf.xacro").write_text("<robot name='r'/>")
-    with pytest.raises(
-        RequestError, match=r"no format reads .xacro; known: .*; write a URDF with `xacro FILE"
-    ):
-        find_scenes([str(tmp_path / "robot.urdf.xacro")])
+@pytest.mark.parametrize(("name", "says"), [("none.xml", r"none\.xml"), ("r.urdf.xacro", XACRO)])
+def test_a_missing_file_or_one_of_xacro_is_refused_by_its_name_or_with_the_remedy(name, says, tmp_path):
+    (tmp_path / "r.urdf.xacro").write_text("<robot name='r'/>")
+    with pytest.raises(RequestError, match=says):
+        find_scenes([str(tmp_path / name)])

@@ -50,20 +50,17 @@ def test_reference_of_an_awkward_mechanism_is_within_its_bound(kind, seed):
     assert error_over_bound(kind, seed) <= 1
 
 
-def test_both_formulations_of_the_reference_agree_on_a_gimbal():
-    """Natural coordinates and a tree of joints share no equations; poses differ by less than 1e-15 m or rad
-    (5e-17 measured). Formulation B would differ by more if its steps did not resolve the motion."""
-    scene, times = awkward("gimbal", 0), np.linspace(0.0, 0.12, 4)
+@pytest.mark.parametrize(
+    ("kind", "end", "steps", "apart"),
+    [("gimbal", 0.12, 100, 1e-15), ("chain_of_twenty", 0.03, 10, 1e-14)],  # measured: 5e-17; 5 steps, 1e-16
+)
+def test_formulations_of_the_reference_agree_on_a_gimbal_and_an_ill_conditioned_chain(
+    kind, end, steps, apart
+):
+    """Natural coordinates and a tree of joints share no equations; poses differ by less than ``apart`` (m,
+    rad). The chain's mass matrix has the condition 1e6. If formulation B rejected steps for its rounding,
+    they would become ever shorter."""
+    scene, times = awkward(kind, 0), np.linspace(0.0, end, 4)
     a, b = (move(scene, times, EXTENDED, seconds=SECONDS) for move in (natural_motion, tree_motion))
-    assert not a.reason and not b.reason
-    assert differences(scene, a, b).max() < 1e-15
-
-
-def test_collocation_steps_with_an_ill_conditioned_mass_matrix_are_accepted():
-    """The mass matrix of thirty freedoms has the condition number 1e6. If formulation B rejected steps for
-    its rounding, they would become ever shorter; it needs fewer than ten in 0.03 s (5 are measured). Poses
-    are formulation A's to 1e-14 m or rad (1e-16 is measured)."""
-    scene, times = awkward("chain_of_twenty", 0), np.linspace(0.0, 0.03, 3)
-    a, b = (move(scene, times, EXTENDED, seconds=SECONDS) for move in (natural_motion, tree_motion))
-    assert not b.reason and b.steps < 10
-    assert differences(scene, a, b).max() < 1e-14
+    assert not a.reason and not b.reason and b.steps < steps
+    assert differences(scene, a, b).max() < apart

@@ -292,16 +292,11 @@ def test_accelerations_that_are_wrong_from_a_sample_on_are_named_with_their_time
     assert found.by > 100 * found.allowed
 
 
-def neighbouring_samples() -> Trajectory:
-    """Return the true motion at twelve times 1e-5 s apart."""
-    return exact_of(double_hinge)[1].poses(0.1 + 1e-5 * np.arange(12))
-
-
 @pytest.mark.parametrize("size", [1e-9, 1e-6])
 def test_noise_of_positions_is_measured_within_a_factor_of_six(size):
-    """A smooth motion has no sixth difference of neighbouring samples: rounding is found. Normal noise of a
-    standard deviation (m) is found to a factor of six: twelve samples show its spread no better."""
-    scene, run = double_hinge(), neighbouring_samples()
+    """A smooth motion has no sixth difference of twelve samples, 10 µs apart: rounding is found. Normal noise
+    of a standard deviation (m) is found to a factor of six: so few samples show its spread no better."""
+    scene, run = double_hinge(), exact_of(double_hinge)[1].poses(0.1 + 1e-5 * np.arange(12))
     assert grain(scene, run)[0] < ROUNDING
     noise = size * np.random.default_rng(3).standard_normal(run.position.shape)
     found, of = grain(scene, replace(run, position=run.position + noise))

@@ -30,10 +30,6 @@ def angle(each) -> float:
     return float(np.arctan2(x, -z))
 
 
-def squares(each) -> np.ndarray:
-    return np.asarray(each.eigenvalues**2)
-
-
 @cache
 def steady(rate):
     """Return the steady motions of the pendulum at a rate (rad/s) of its spindle."""
@@ -53,21 +49,16 @@ def test_a_pendulum_on_a_spindle_leaves_the_axis_above_the_critical_rate(rate):
         a = angle(each)
         bend = MASS * G * LENGTH * np.cos(a) - MASS * LENGTH**2 * rate**2 * np.cos(2 * a)
         exact = -bend / (OWN + MASS * LENGTH**2)
-        assert np.allclose(squares(each), exact, rtol=1e-11), (rate, a)
+        assert np.allclose(each.eigenvalues**2, exact, rtol=1e-11), (rate, a)
         assert each.stability == ("stable" if exact < 0 else "unstable") and each.rate == abs(rate)
 
 
-def test_hinge_of_a_steady_motion_carries_weight_and_centripetal_force():
-    """At Ω = 6 rad/s and the radius r it carries m Ω² r towards the axis, and m g, to ACCURACY."""
+def test_steady_motion_has_velocities_and_its_hinge_carries_weight_and_centripetal_force():
+    """At Ω = 6 rad/s and the radius r the hinge carries m Ω² r towards the axis, and m g. Both bodies turn at
+    Ω about z; the ball moves at Ω r. All to ACCURACY."""
     [each] = [e for e in steady(6.0) if e.stability == "stable" and angle(e) > 0]
     radius = each.scene.body[1].position[0]
     assert np.allclose(each.reactions["B"][:3], [-MASS * 36.0 * radius, 0.0, MASS * G], atol=ACCURACY)
-
-
-def test_scene_of_a_steady_motion_begins_with_its_velocities():
-    """Both bodies turn at Ω = 6 rad/s about z; the ball at the radius r moves at Ω r, to ACCURACY."""
-    [each] = [e for e in steady(6.0) if e.stability == "stable" and angle(e) > 0]
-    radius = each.scene.body[1].position[0]
     assert np.allclose(each.scene.body[1].velocity, [0.0, 6.0 * radius, 0.0], atol=ACCURACY)
     assert np.allclose([b.angular_velocity for b in each.scene.body], [0.0, 0.0, 6.0], atol=ACCURACY)
 
