@@ -37,8 +37,7 @@ COMMANDS = {  # --help of the commands that take long
         *("files model.xml --engine mbref", "closed-loops", "convergence", "invariants", "alternatives"),
         *(f"reference four_bar_gravity {SHORT} --out reference.csv", "judge four_bar_gravity motion.csv"),
         *("report --render report --section speed", "paper --help", "diff report report", "certify --help"),
-        *("modes", "diagnose four_bar_gravity --engine mujoco", "versions --help"),
-        "derivatives mbref four_bar_gravity",
+        *("modes", "diagnose four_bar_gravity --engine mujoco", "versions --help", "derivatives"),
     ],
 }
 RUNNER = """
