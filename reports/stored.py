@@ -15,6 +15,7 @@ from crosscheck.study.grid import Record
 from crosscheck.study.record_shape import Picture, Timing, Truth, Verdicts, WholeRun, checked
 from crosscheck.study.record_view import of_scenes, with_time
 from crosscheck.study.store import read, read_scenes, unpacked
+from crosscheck.study.truths import key as truth_key
 from mbref.records import RecordsError, json_content
 from mbref.scene import Scene
 
@@ -47,11 +48,38 @@ def _groups(folder: Path) -> list[SceneRuns]:
     if lost:
         raise RecordsError(
             f"{folder}/records.jsonl: records of {', '.join(sorted(lost))} are of another mechanism than the "
-            "file in scenes/; make the report again"
+            "file in scenes/, or end at another time; make the report again"
         )
     gates = [r for r in records if _is_gate(named[r["scene"]], r)]
     runs = [with_time(r, times) for r in records if not any(r is gate for gate in gates)]
+    runs, more[0] = _of_latest_truths(named, runs, more[0])
     return by_scene(_ordered(runs), named, gates, *more)
+
+
+def _of_latest_truths(
+    named: dict[str, Scene], runs: list[Record], truths: list[Record]
+) -> tuple[list[Record], list[Record]]:
+    """Return for each scene its latest truth at sample times of runs, and the runs at these times; all of a
+    scene without such a truth. A folder can have runs at other times, such as of another depth."""
+    keys = {(run["scene"], str(_when(run))): run for run in runs}
+    found = {place: truth_key(named[place[0]], _sampled(run)) for place, run in keys.items()}
+    latest = {truth["scene"]: truth for truth in truths if truth["key"] in found.values()}
+    kept = [
+        run
+        for run in runs
+        if run["scene"] not in latest or found[run["scene"], str(_when(run))] == latest[run["scene"]]["key"]
+    ]
+    return kept, [truth for truth in truths if latest.get(truth["scene"], truth) is truth]
+
+
+def _when(run: Record) -> list[Any]:
+    return [run["asked"].get(name) for name in ("end", "samples", "times")]
+
+
+def _sampled(run: Record) -> np.ndarray:
+    """Return the requested sample times (k,), s."""
+    end, samples, times = _when(run)
+    return np.linspace(0.0, end or 0.0, samples or 0) if times is None else np.array(times)
 
 
 def _of_known_scenes(

@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from crosscheck.setting import TOLERANCES
 from mbref.motions.trajectory import Outcome
 from mbref.records import RecordsError
 
 Record = dict[str, Any]
+MOST_SAMPLES = 10_000_000  # of a run, as of commands
 
 
 def _label(text: str) -> str:
@@ -72,7 +73,7 @@ class _Asked(_Shape):
     engine: str
     options: Annotated[dict[str, Any], AfterValidator(_sizes)]
     end: float | None = None
-    samples: int | None = None
+    samples: Annotated[int, Field(ge=0, le=MOST_SAMPLES)] | None = None
     times: list[float] | None = None
 
 

@@ -45,10 +45,16 @@ def is_completed(record: Record) -> bool:
 
 
 def of_scenes(records: Sequence[Record], scenes: Sequence[Scene]) -> list[Record]:
-    """Return the records of these scenes, without records of a scene's earlier version. A record that names
-    no mechanism counts as a record of the present scene."""
-    known = {scene.name: mechanism(scene) for scene in scenes}
-    return [r for r in records if r["scene"] in known and r.get("mechanism") in (None, known[r["scene"]])]
+    """Return the records of these scenes, without records of a scene's earlier version or duration. A record
+    that names no mechanism or end time counts as a record of the present scene."""
+    known = {scene.name: (mechanism(scene), scene.duration) for scene in scenes}
+
+    def is_present(record: Record) -> bool:
+        own, end = known.get(record["scene"], (None, None))
+        asked = record.get("asked", {}).get("end")
+        return own is not None and record.get("mechanism") in (None, own) and asked in (None, end)
+
+    return [record for record in records if is_present(record)]
 
 
 def ended(record: Record) -> str:

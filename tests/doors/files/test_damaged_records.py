@@ -5,9 +5,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from crosscheck.cli import main as crosscheck
+from crosscheck.study.truths import truth_record
+from mbref.records import strict_json
 from mbref.scenes import SCENES
 from reports.__main__ import main as report
 from tests.fuzz.broken_files import RECORD
@@ -204,3 +207,19 @@ def test_records_of_another_mechanism_than_the_scene_file_are_named_and_not_left
     place = folder(tmp_path / "report", record_with("mechanism", "0123456789abcdef"))
     assert report(["--render", str(place)]) == 2
     assert "records of four_bar are of another mechanism" in capsys.readouterr().err
+
+
+def test_report_shows_the_runs_at_the_times_of_the_latest_truth_alone(tmp_path):
+    """A folder has runs of one mechanism to 0.1 s at 2 and at 3 samples, and to 0.2 s, with other errors. Its
+    scene ends at 0.1 s, and the latest truth is of 3 samples."""
+    asked = {"2.22e-05": {"samples": 2}, "3.33e-05": {"samples": 3}, "4.44e-05": {"samples": 3, "end": 0.2}}
+    runs = [
+        RECORD | {"key": error, "asked": RECORD["asked"] | when, "metrics": {"error": float(error)}}
+        for error, when in asked.items()
+    ]
+    place = folder(tmp_path / "r", "".join(json.dumps(run) + "\n" for run in runs).encode())
+    truths = [truth_record(SCENES["four_bar"](), np.linspace(0.0, 0.1, k), 0.0) for k in (2, 3)]
+    (place / "truths.jsonl").write_text("".join(strict_json(truth) + "\n" for truth in truths))
+    assert report(["--render", str(place), "--section", "records"]) == 0
+    shown = (place / "index.html").read_text()
+    assert [error for error in asked if error in shown] == ["3.33e-05"]
