@@ -29,22 +29,15 @@ def rail(across: float, inertia: float = 0.02) -> Scene:
     """A slide on an arm, pulled by a spring to a point at the height ``across`` (m) over their plane and by a
     force of as many N across it: both tend to turn arm and slide out of the plane."""
     middle, above = (0.3, 0.0, 0.0), (0.3, 0.5, across)
-    return Scene(
-        name="rail",
-        duration=0.5,
-        body=(
-            Body(name="arm", mass=1.0, inertia=(0.01, 0.02, 0.02), position=(0.1, 0.0, 0.0)),
-            Body(name="slide", mass=1.0, inertia=(inertia, inertia, inertia), position=middle),
-        ),
-        joint=(
-            Revolute(name="pin", bodies=("ground", "arm"), anchor=(0.0, 0.0, 0.0), axis=Z),
-            Translational(name="guide", bodies=("arm", "slide"), anchor=middle, axis=X),
-        ),
-        load=(
-            Spring(bodies=("ground", "slide"), points=(above, middle), stiffness=20.0, natural_length=0.3),
-            Force(body="slide", point=middle, force=(0.0, 0.0, across)),
-        ),
+    bodies = (
+        Body(name="arm", mass=1.0, inertia=(0.01, 0.02, 0.02), position=(0.1, 0.0, 0.0)),
+        Body(name="slide", mass=1.0, inertia=(inertia, inertia, inertia), position=middle),
     )
+    pin = Revolute(name="pin", bodies=("ground", "arm"), anchor=(0.0, 0.0, 0.0), axis=Z)
+    guide = Translational(name="guide", bodies=("arm", "slide"), anchor=middle, axis=X)
+    pull = Spring(bodies=("ground", "slide"), points=(above, middle), stiffness=20.0, natural_length=0.3)
+    push = Force(body="slide", point=middle, force=(0.0, 0.0, across))
+    return Scene(name="rail", duration=0.5, body=bodies, joint=(pin, guide), load=(pull, push))
 
 
 NUMBERS_DECIDE = {

@@ -14,22 +14,18 @@ def pushed(crank: float, rod: float, angle: float, speed: float, size: float = 1
     tilt = -math.asin(crank * math.sin(angle) / rod)
     pin = (a * math.cos(angle), a * math.sin(angle), 0.0)
     slider = (pin[0] + b * math.cos(tilt), 0.0, 0.0)
-    scene = Scene(
-        name="pushed",
-        duration=4.0 * (a + b - slider[0]) / (speed * size),
-        body=[
-            _link("crank", (0.0, 0.0, 0.0), pin, angle, size),
-            _link("rod", pin, slider, tilt, size),
-            _link("slider", slider, slider, 0.0, size),
-        ],
-        joint=[
-            hinge("O", "ground", "crank", (0.0, 0.0, 0.0)),
-            hinge("P", "crank", "rod", pin),
-            hinge("Q", "rod", "slider", slider),
-            slide("S", "ground", "slider", slider),
-        ],
-        driver=[{"joint": "S", "polynomial": [0.0, speed * size]}],
+    bodies = [
+        _link("crank", (0.0, 0.0, 0.0), pin, angle, size),
+        _link("rod", pin, slider, tilt, size),
+        _link("slider", slider, slider, 0.0, size),
+    ]
+    turns = hinge("O", "ground", "crank", (0.0, 0.0, 0.0)), hinge("P", "crank", "rod", pin)
+    joints = [*turns, hinge("Q", "rod", "slider", slider), slide("S", "ground", "slider", slider)]
+    duration, driver = (
+        4.0 * (a + b - slider[0]) / (speed * size),
+        {"joint": "S", "polynomial": [0, speed * size]},
     )
+    scene = Scene(name="pushed", duration=duration, body=bodies, joint=joints, driver=[driver])
     return scene, (a + b - slider[0]) / (speed * size)
 
 

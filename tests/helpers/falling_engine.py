@@ -6,12 +6,8 @@ from crosscheck.engine import Engine, Setting, Trajectory
 from mbref.scene import Body, Scene
 
 FACTOR, STEP = 1.0, 0.1
-STONE = Scene(
-    name="stone",
-    gravity=(0.0, 0.0, -9.81),
-    duration=0.2,
-    body=(Body(name="stone", mass=2.0, inertia=(0.1, 0.1, 0.1), position=(0.0, 1.0, 2.0)),),
-)
+BODY = Body(name="stone", mass=2.0, inertia=(0.1, 0.1, 0.1), position=(0.0, 1.0, 2.0))
+STONE = Scene(name="stone", gravity=(0.0, 0.0, -9.81), duration=0.2, body=(BODY,))
 
 
 class Options:

@@ -107,15 +107,8 @@ def arm(driver: tuple[Driver, ...] = ()) -> Scene:
     ]
     if not driver:
         loads.append(JointTorque(joint="R", torque=1.2, factor=Factor(sine=WAVE)))
-    return Scene(
-        name="arm",
-        gravity=(0.0, 0.0, -9.81),
-        duration=2.0,
-        body=[rod, block],
-        joint=[hinge, tube],
-        driver=driver,
-        load=loads,
-    )
+    parts = {"body": [rod, block], "joint": [hinge, tube], "driver": driver, "load": loads}
+    return Scene(name="arm", gravity=(0.0, 0.0, -9.81), duration=2.0, **parts)
 
 
 def driven_arm() -> Scene:

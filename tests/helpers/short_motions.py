@@ -260,13 +260,9 @@ def driven_gears() -> Scene:
         hinge("B", "ground", "wheel", (0.5, 0.0, 0.0)),
         hinge("C", "wheel", "bob", (0.7, 0.0, 0.0), (0.0, 0.6, 0.8)),
     ]
-    return made(
-        "driven gears",
-        bodies,
-        joints,
-        coupling=[{"name": "mesh", "joints": ["A", "B"], "ratio": -2.0}],
-        driver=[{"joint": "A", "polynomial": [0.0, 1.0, 2.0]}],
-    )
+    mesh = {"name": "mesh", "joints": ["A", "B"], "ratio": -2.0}
+    driver = {"joint": "A", "polynomial": [0.0, 1.0, 2.0]}
+    return made("driven gears", bodies, joints, coupling=[mesh], driver=[driver])
 
 
 # Bodies of special kinds.

@@ -37,15 +37,9 @@ def spinning_mechanism(seed: int) -> Scene:
         (bodies[0], joints[0]), (bodies[1], joints[1]) = (_added(rng, f"b{k}", None, spin) for k in range(2))
         bodies[2:], joints[2:] = [], []
     loads = [_load(rng, joint) for joint in joints if rng.random() < 0.7 and joint.facts.loaded]
-    return Scene(
-        name=f"spinning_{seed}",
-        gravity=tuple(rng.uniform(-3.0, 3.0, 3)),
-        duration=4.0,
-        body=bodies,
-        joint=joints,
-        coupling=gears if geared else [],
-        load=loads,
-    )
+    parts = {"body": bodies, "joint": joints, "coupling": gears if geared else [], "load": loads}
+    gravity = tuple(rng.uniform(-3.0, 3.0, 3))
+    return Scene(name=f"spinning_{seed}", gravity=gravity, duration=4.0, **parts)
 
 
 def _added(rng, name, parent, spin=None):

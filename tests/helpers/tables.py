@@ -42,14 +42,10 @@ def write_table(table: Table, path: Path, form: Format, separator: str = ",") ->
 
 def damped_pendulum() -> Scene:
     """Return a pendulum with spring, damper and armature, which starts at rest and horizontal."""
-    return Scene(
-        name="damped_pendulum",
-        gravity=(0.0, -9.81, 0.0),
-        duration=1.0,
-        body=[Body(name="rod", mass=1.2, inertia=(0.01, 0.1, 0.1), position=(0.4, 0.0, 0.0))],
-        joint=[Revolute(name="A", bodies=("ground", "rod"), anchor=(0, 0, 0), axis=(0, 0, 1), armature=0.03)],
-        load=[TorsionSpring(joint="A", stiffness=2.0, damping=0.15)],
-    )
+    rod = Body(name="rod", mass=1.2, inertia=(0.01, 0.1, 0.1), position=(0.4, 0.0, 0.0))
+    hinge = Revolute(name="A", bodies=("ground", "rod"), anchor=(0, 0, 0), axis=(0, 0, 1), armature=0.03)
+    parts = {"body": [rod], "joint": [hinge], "load": [TorsionSpring(joint="A", stiffness=2.0, damping=0.15)]}
+    return Scene(name="damped_pendulum", gravity=(0.0, -9.81, 0.0), duration=1.0, **parts)
 
 
 def switched_motor() -> Scene:
@@ -70,16 +66,10 @@ def double_pendulum() -> Scene:
     """Return two rods with hinges in different directions, under a gravity along no axis."""
     upper = Body(name="upper", mass=2.0, inertia=(0.02, 0.05, 0.06), position=(0.3, 0.0, 0.0))
     lower = Body(name="lower", mass=1.0, inertia=(0.01, 0.04, 0.03), position=(0.9, 0.1, 0.0))
-    return Scene(
-        name="double_pendulum",
-        gravity=(0.3, -9.81, 0.5),
-        duration=0.4,
-        body=[upper, lower],
-        joint=[
-            Revolute(name="A", bodies=("ground", "upper"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),
-            Revolute(name="B", bodies=("upper", "lower"), anchor=(0.6, 0.0, 0.0), axis=(0.0, 0.6, 0.8)),
-        ],
-    )
+    first = Revolute(name="A", bodies=("ground", "upper"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+    second = Revolute(name="B", bodies=("upper", "lower"), anchor=(0.6, 0.0, 0.0), axis=(0.0, 0.6, 0.8))
+    parts = {"body": [upper, lower], "joint": [first, second]}
+    return Scene(name="double_pendulum", gravity=(0.3, -9.81, 0.5), duration=0.4, **parts)
 
 
 def turned(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Scene, Table], Table]:

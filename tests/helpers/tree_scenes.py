@@ -84,19 +84,11 @@ def ring(kind: str) -> Scene:
     cylindrical, universal or spherical joint the motion is the same planar one, and rows are redundant."""
     last = JOINT_TYPES[kind].at("C", ("b", "c"), anchor=(0.7, 0.5, 0.0), axis=Z, axes=(Z, (0.0, 1.0, 0.0)))
     spin = {"angular_velocity": (0.0, 0.0, 3.0)}
-    return Scene(
-        name=f"ring_{kind}",
-        gravity=(0.0, -9.81, 0.0),
-        duration=0.4,
-        body=(
-            Body(name="a", mass=1.0, inertia=(0.01, 0.02, 0.02), position=(0.0, 0.15, 0.0), **spin),
-            Body(name="b", mass=2.0, inertia=(0.01, 0.05, 0.05), position=(0.35, 0.4, 0.0)),
-            Body(name="c", mass=1.5, inertia=(0.02, 0.01, 0.02), position=(0.7, 0.25, 0.0)),
-        ),
-        joint=(
-            hinge("A", "ground", "a", (0.0, 0.0, 0.0)),
-            hinge("B", "a", "b", (0.0, 0.3, 0.0)),
-            hinge("D", "ground", "c", (0.7, 0.0, 0.0)),
-            last,
-        ),
+    bodies = (
+        Body(name="a", mass=1.0, inertia=(0.01, 0.02, 0.02), position=(0.0, 0.15, 0.0), **spin),
+        Body(name="b", mass=2.0, inertia=(0.01, 0.05, 0.05), position=(0.35, 0.4, 0.0)),
+        Body(name="c", mass=1.5, inertia=(0.02, 0.01, 0.02), position=(0.7, 0.25, 0.0)),
     )
+    left, right = hinge("A", "ground", "a", (0.0, 0.0, 0.0)), hinge("D", "ground", "c", (0.7, 0.0, 0.0))
+    parts = {"body": bodies, "joint": (left, hinge("B", "a", "b", (0.0, 0.3, 0.0)), right, last)}
+    return Scene(name=f"ring_{kind}", gravity=(0.0, -9.81, 0.0), duration=0.4, **parts)

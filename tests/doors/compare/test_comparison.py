@@ -21,11 +21,8 @@ from mbref.scenes import SCENES
 from tests.helpers.fake_engines import FAKES
 
 FAKE = f"{FAKES}:FAKE"
-BLOCK = Scene(
-    name="block",
-    body=(Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0)),),
-    duration=0.5,
-)
+BODY = Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
+BLOCK = Scene(name="block", body=(BODY,), duration=0.5)
 
 
 @pytest.fixture(scope="module")

@@ -72,12 +72,10 @@ def test_standard_error_of_a_number_is_by_the_scatter_of_the_columns_that_determ
     """Forces F push two carts: x = F g with g = t²/(2 m). The regression of each column alone has the
     standard error √(Σ r²/(k - 1)/Σ g²); one column is measured 1000 times as accurately as the other."""
     times, random, masses = np.linspace(0.05, 1.0, 20), np.random.default_rng(0), {"A": 2.0, "B": 3.0}
-    scene = Scene(
-        name="carts",
-        body=[body(name, mass, [0.1] * 3, (mass, 0.0, 0.0)) for name, mass in masses.items()],
-        joint=[slide(name, "ground", name, (mass, 0.0, 0.0)) for name, mass in masses.items()],
-        load=[{"type": "joint_force", "joint": name, "force": 4.0} for name in masses],
-    )
+    bodies = [body(name, mass, [0.1] * 3, (mass, 0.0, 0.0)) for name, mass in masses.items()]
+    slides = [slide(name, "ground", name, (mass, 0.0, 0.0)) for name, mass in masses.items()]
+    pushes = [{"type": "joint_force", "joint": name, "force": 4.0} for name in masses]
+    scene = Scene(name="carts", body=bodies, joint=slides, load=pushes)
     columns, true = {"time": times}, []
     for (name, mass), noise in zip(masses.items(), (1e-4, 0.1), strict=True):
         g = times**2 / (2.0 * mass)

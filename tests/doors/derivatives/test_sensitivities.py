@@ -199,17 +199,15 @@ def test_equilibrium_of_two_coupled_links_moves_with_their_pin_as_in_closed_form
     ends = {"A": ("ground", "rod", (0.0, 0.0, 0.0)), "B": ("rod", "arm", (0.6, 0.1, 0.0))}
     ends["W"] = ("ground", "wheel", (-0.5, 0.0, 0.0))
     armature = {"A": 0.05, "B": 0.0, "W": 0.02}
-    scene = Scene(
-        name="links",
-        gravity=(0.0, -GRAVITY, 0.0),
-        body=bodies,
-        joint=[hinge(name, *end, armature=armature[name]) for name, end in ends.items()],
-        coupling=[{"name": "s", "joints": [*ends], "ratios": [1.0, 1.0, -1.0]}],
-        load=[
+    parts = {
+        "joint": [hinge(name, *end, armature=armature[name]) for name, end in ends.items()],
+        "coupling": [{"name": "s", "joints": [*ends], "ratios": [1.0, 1.0, -1.0]}],
+        "load": [
             {"type": "torsion_spring", "joint": "W", "stiffness": 8.0, "damping": 0.3, "natural_angle": -14},
             {"type": "torsion_spring", "joint": "B", "stiffness": 30.0, "damping": 0.1},
         ],
-    )
+    }
+    scene = Scene(name="links", gravity=(0.0, -GRAVITY, 0.0), body=bodies, **parts)
     rest = mbref.equilibria(scene)[0].scene
     rod, arm, pin = (np.array(each) for each in (*(b.position for b in rest.body[:2]), rest.joint[1].anchor))
     both = 8.0 - 0.7 * GRAVITY * (arm - pin)[1]

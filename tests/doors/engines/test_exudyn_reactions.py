@@ -27,14 +27,12 @@ def test_exudyns_reaction_causes_the_acceleration_of_the_body(kind, driven, bodi
     """One body on one joint under gravity and a moment. ``balance`` is what Newton's and Euler's equations
     leave of reaction, loads and acceleration: at most ten times the measured 1.6e-10 of the largest force, or
     of the largest moment over the length."""
-    scene = Scene(
-        name="held",
-        body=(BODY,),
-        gravity=(1.0, -9.81, 2.0),
-        joint=(HOLONOMIC_JOINTS[kind].at("J", bodies, **PLACES),),
-        driver=(Driver(joint="J", polynomial=(0.0, 3.0)),) if driven else (),
-        load=(Moment(body="b", moment=(0.3, 0.5, -0.4)),),
-    )
+    parts = {
+        "joint": (HOLONOMIC_JOINTS[kind].at("J", bodies, **PLACES),),
+        "driver": (Driver(joint="J", polynomial=(0.0, 3.0)),) if driven else (),
+        "load": (Moment(body="b", moment=(0.3, 0.5, -0.4)),),
+    }
+    scene = Scene(name="held", body=(BODY,), gravity=(1.0, -9.81, 2.0), **parts)
     trajectory = ENGINE.run(scene, np.linspace(0, 0.4, 5), Setting("tuned", {"step": 1e-3}))
     assert trajectory.outcome is Outcome.COMPLETED, trajectory.message
     assert balance(scene, trajectory, trajectory) < MARGIN * 1.6e-10

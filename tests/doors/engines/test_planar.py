@@ -129,20 +129,15 @@ def swash_plate(bodies: tuple[str, str]) -> tuple[Scene, np.ndarray]:
     """A driven inclined plate that lifts a pin beside it, and the heights (k,) of the pin."""
     inertia, slope, radius, rate = (0.01, 0.02, 0.03), 0.3, 0.5, 3.0
     foot = (radius, 0.0, 0.0)
-    scene = Scene(
-        name="swash_plate",
-        duration=1.0,
-        body=(
-            Body(name="plate", mass=1.0, inertia=inertia, position=(0.0, 0.0, 0.0)),
-            Body(name="pin", mass=1.0, inertia=inertia, position=(radius, 0.0, 0.2)),
-        ),
-        joint=(
-            Revolute(name="A", bodies=("ground", "plate"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),
-            Cylindrical(name="B", bodies=("ground", "pin"), anchor=foot, axis=(0.0, 0.0, 1.0)),
-            Planar(name="P", bodies=bodies, anchor=foot, axis=(slope, 0.0, 1.0)),
-        ),
-        driver=(Driver(joint="A", polynomial=(0.0, rate)),),
+    plate = Body(name="plate", mass=1.0, inertia=inertia, position=(0.0, 0.0, 0.0))
+    pin = Body(name="pin", mass=1.0, inertia=inertia, position=(radius, 0.0, 0.2))
+    joints = (
+        Revolute(name="A", bodies=("ground", "plate"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),
+        Cylindrical(name="B", bodies=("ground", "pin"), anchor=foot, axis=(0.0, 0.0, 1.0)),
+        Planar(name="P", bodies=bodies, anchor=foot, axis=(slope, 0.0, 1.0)),
     )
+    driver = Driver(joint="A", polynomial=(0.0, rate))
+    scene = Scene(name="swash_plate", duration=1.0, body=(plate, pin), joint=joints, driver=(driver,))
     return scene, 0.2 + slope * radius * (1 - np.cos(rate * TIMES))
 
 

@@ -77,14 +77,11 @@ def test_engines_have_the_exact_unique_reactions_and_resultants(name):
 
 
 # two leaves: the first on hinges A and B of the ground, the second on hinge C of the first; all axes along z
+HUNG = hinge("A", "ground", "a", (0.0, 0.0, 0.0)), hinge("B", "ground", "a", (0.0, 0.0, 2.0))
 LEAVES = Scene(
     name="door",
     body=(block("a", (1.0, 0.0, 0.0)), block("b", (3.0, 0.0, 0.0))),
-    joint=(
-        hinge("A", "ground", "a", (0.0, 0.0, 0.0)),
-        hinge("B", "ground", "a", (0.0, 0.0, 2.0)),
-        hinge("C", "a", "b", (2.0, 0.0, 0.0)),
-    ),
+    joint=(*HUNG, hinge("C", "a", "b", (2.0, 0.0, 0.0))),
     gravity=(0.0, 0.0, 0.0),
 )
 POSE = initial_poses(LEAVES)

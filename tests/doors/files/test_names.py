@@ -39,13 +39,9 @@ NAMES = [
 
 def named(name: str) -> Scene:
     """Return a pendulum, all parts of which have a name."""
-    return Scene(
-        name=name,
-        gravity=(0.0, -9.81, 0.0),
-        duration=0.01,
-        body=[{"name": name, "mass": 1.0, "inertia": [0.1, 0.1, 0.1], "position": [1.0, 0.0, 0.0]}],
-        joint=[hinge(f"{name}'", "ground", name, (0.0, 0.0, 0.0))],
-    )
+    bodies = [{"name": name, "mass": 1.0, "inertia": [0.1, 0.1, 0.1], "position": [1.0, 0.0, 0.0]}]
+    hinges = [hinge(f"{name}'", "ground", name, (0.0, 0.0, 0.0))]
+    return Scene(name=name, gravity=(0.0, -9.81, 0.0), duration=0.01, body=bodies, joint=hinges)
 
 
 def test_file_names_of_different_names_differ_and_are_safe_words_of_a_shell(tmp_path):

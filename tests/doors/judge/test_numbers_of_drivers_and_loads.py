@@ -35,21 +35,15 @@ def machine(seed: int) -> Scene:
     inertia, gravity = 0.1 + size[1], tuple(9.81 * (size[2:5] - 0.6))
     crank = rod("crank", (0.3, 0, 0), size[0] + 0.5, inertia)
     block = rod("block", (1.0, 0, 0), size[5], inertia)
-    return Scene(
-        name="machine",
-        gravity=gravity,
-        duration=1.0,
-        body=[crank, block],
-        joint=[
-            hinge("A", "ground", "crank", (0, 0, 0), armature=size[6]),
-            slide("B", "crank", "block", (1, 0, 0), armature=size[7]),
-        ],
-        load=[
-            SlideSpring(joint="B", stiffness=20 * size[8], damping=size[9], natural_displacement=0.2),
-            spring("ground", (0.2, 1.5, 0.1), "block", (1.1, 0.1, 0.0), 10 * size[10], 0.5, 0.5),
-        ],
-        driver=[Driver(joint="A", polynomial=(0.0, 0.5, 1.0), sine={"amplitude": 0.3, "frequency": 4.0})],
-    )
+    turn = hinge("A", "ground", "crank", (0, 0, 0), armature=size[6])
+    guide = slide("B", "crank", "block", (1, 0, 0), armature=size[7])
+    loads = [
+        SlideSpring(joint="B", stiffness=20 * size[8], damping=size[9], natural_displacement=0.2),
+        spring("ground", (0.2, 1.5, 0.1), "block", (1.1, 0.1, 0.0), 10 * size[10], 0.5, 0.5),
+    ]
+    driver = Driver(joint="A", polynomial=(0.0, 0.5, 1.0), sine={"amplitude": 0.3, "frequency": 4.0})
+    parts = {"body": [crank, block], "joint": [turn, guide], "load": loads, "driver": [driver]}
+    return Scene(name="machine", gravity=gravity, duration=1.0, **parts)
 
 
 @pytest.mark.parametrize(
@@ -117,14 +111,12 @@ def test_torque_that_the_mechanism_does_not_determine_is_named_and_not_right(tmp
 
 def wound_disc() -> Scene:
     """Return a disc of 1 kg m² on a torsion spring of 1 N m/rad, which turns by 10 sin t."""
-    return Scene(
-        name="wound_disc",
-        gravity=(0.0, 0.0, 0.0),
-        duration=10.0,
-        body=[rod("disc", (0, 0, 0), 1.0, 1.0) | {"angular_velocity": (0, 0, 10.0)}],
-        joint=[hinge("A", "ground", "disc", (0, 0, 0))],
-        load=[TorsionSpring(joint="A", stiffness=1.0)],
-    )
+    disc = rod("disc", (0, 0, 0), 1.0, 1.0) | {"angular_velocity": (0, 0, 10.0)}
+    parts = {
+        "joint": [hinge("A", "ground", "disc", (0, 0, 0))],
+        "load": [TorsionSpring(joint="A", stiffness=1.0)],
+    }
+    return Scene(name="wound_disc", gravity=(0.0, 0.0, 0.0), duration=10.0, body=[disc], **parts)
 
 
 @pytest.mark.parametrize("times", [(1.0, 2.0, 5.0, 8.0), (8.0,), tuple(np.linspace(0.0, 8.0, 30))], ids=len)

@@ -117,6 +117,7 @@ def test_rod_of_a_folded_slider_crank_turns_about_the_resting_slider():
     assert max(off) < ROUNDED, f"rod and slider off by {off}"
 
 
+PIVOT = Revolute(name="pivot", bodies=("ground", "bar"), anchor=(0, 0, 0), axis=Z)
 STRANGERS = {
     "pivot of the rocker moved": SCENES["four_bar"]().with_("joint[D].anchor", (0.51, 0.0, 0.0)),
     "crank longer than the rod": planar_slider_crank(0.5, 0.4),
@@ -128,11 +129,7 @@ STRANGERS = {
         joint=(pendulum().joint[0], Revolute(name="p", bodies=("ground", "other"), anchor=(0, 0, 0), axis=Z)),
     ),
     "spherical pendulum": pendulum(joint=(Spherical(name="b", bodies=("ground", "bar"), anchor=(0, 0, 0)),)),
-    "no mass, no driver": Scene(
-        name="s",
-        body=(Body(name="bar", position=(1, 0, 0)),),
-        joint=(Revolute(name="pivot", bodies=("ground", "bar"), anchor=(0, 0, 0), axis=Z),),
-    ),
+    "no mass, no driver": Scene(name="s", body=(Body(name="bar", position=(1, 0, 0)),), joint=(PIVOT,)),
     "slender free rod": free(body=(free().body[0].model_copy(update={"inertia": (0.0, 0.3, 0.3)}),)),
     "two drivers": SCENES["four_bar"]().with_(
         driver=(*SCENES["four_bar"]().driver, Driver(joint="D", polynomial=(0.0, -124.8)))

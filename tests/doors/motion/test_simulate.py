@@ -22,13 +22,8 @@ def completed(scene, method="mpi-svd+projection", times=(0.0, 1.0), limits=FINE)
 
 
 def one_body(joint, load=(), driver=(), **body):
-    return Scene(
-        name="one",
-        body=(Body(name="b", position=(1.0, 0.0, 0.0), **{**ROD, **body}),),
-        joint=joint,
-        load=load,
-        driver=driver,
-    )
+    bodies = (Body(name="b", position=(1.0, 0.0, 0.0), **{**ROD, **body}),)
+    return Scene(name="one", body=bodies, joint=joint, load=load, driver=driver)
 
 
 def difference(measured, expected):
@@ -72,12 +67,9 @@ def test_bodies_without_masses_follow_their_drivers(method):
     sine = Sine(amplitude=0.5, frequency=3.0)
     hinge = Revolute(name="H", bodies=("ground", "arm"), anchor=(0, 0, 0), axis=(0, 0, 1))
     slide = Translational(name="S", bodies=("arm", "block"), anchor=(1, 0, 0), axis=(1, 0, 0))
-    scene = Scene(
-        name="arm",
-        body=(Body(name="arm", position=(0.5, 0, 0)), Body(name="block", position=(1, 0, 0))),
-        joint=(hinge, slide),
-        driver=(Driver(joint="H", polynomial=(0, 1, 0.5), sine=sine), Driver(joint="S", polynomial=(0, 2))),
-    )
+    drivers = Driver(joint="H", polynomial=(0, 1, 0.5), sine=sine), Driver(joint="S", polynomial=(0, 2))
+    bodies = Body(name="arm", position=(0.5, 0, 0)), Body(name="block", position=(1, 0, 0))
+    scene = Scene(name="arm", body=bodies, joint=(hinge, slide), driver=drivers)
     t = np.linspace(0, 1, 5)
     angle, reach = t + 0.5 * t**2 + 0.5 * np.sin(3 * t), 1 + 2 * t
     trajectory = completed(scene, method, t)

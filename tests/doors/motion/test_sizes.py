@@ -31,13 +31,13 @@ def test_built_in_scenes_complete_with_proportional_positions_at_every_size(name
 def rack_and_pinion() -> Scene:
     """Return a driven pinion with armature, 2 rad/s and 6 rad/s², and a rack with armature on its slide."""
     guide = {"type": "translational", "bodies": ["ground", "rack"], "anchor": (0, 0.2, 0), "axis": (1, 0, 0)}
-    return Scene(
-        name="rack_and_pinion",
-        body=[rod("pinion", ORIGIN), rod("rack", (0.0, 0.2, 0.0), mass=1.5)],
-        joint=[hinge("A", ("ground", "pinion")) | {"armature": 0.4}, {"name": "B", "armature": 0.7} | guide],
-        coupling=[{"name": "teeth", "joints": ("A", "B"), "ratio": -0.2, "offset": 0.01}],
-        driver=[{"joint": "A", "polynomial": (0.0, 2.0, 3.0)}],
-    )
+    motors = hinge("A", ("ground", "pinion")) | {"armature": 0.4}, {"name": "B", "armature": 0.7} | guide
+    parts = {
+        "body": [rod("pinion", ORIGIN), rod("rack", (0.0, 0.2, 0.0), mass=1.5)],
+        "coupling": [{"name": "teeth", "joints": ("A", "B"), "ratio": -0.2, "offset": 0.01}],
+        "driver": [{"joint": "A", "polynomial": (0.0, 2.0, 3.0)}],
+    }
+    return Scene(name="rack_and_pinion", joint=motors, **parts)
 
 
 @pytest.mark.parametrize("mass", [1.0, 1e-9])

@@ -222,22 +222,15 @@ def geared_sled() -> Scene:
         for name, x in (("rod", 0.5), ("wheel", 3.0), ("sled", 0.8))
     )
     path = {"polynomial": [0.0, 0.1, 0.2]}
-    return Scene(
-        name="sled",
-        gravity=DOWN,
-        duration=0.5,
-        body=[rod, wheel, sled],
-        joint=[
-            hinge("A", ("ground", "rod")),
-            hinge("W", ("ground", "wheel"), (3.0, 0.0, 0.0)),
-            parts.slide("S", "rod", "sled", (0.8, 0.0, 0.0), (1.0, 0.0, 0.0)),
-        ],
-        coupling=[{"name": "gears", "joints": ["W", "A"], "ratio": 1.0, "offset": 0.6}],
-        driver=[
-            {"joint": "W", **path},
-            {"name": "tip", "body": "sled", "point": [0.8, 0.0, 0.0], "along": [1.0, 0.0, 0.0], **path},
-        ],
-    )
+    joints = [
+        hinge("A", ("ground", "rod")),
+        hinge("W", ("ground", "wheel"), (3.0, 0.0, 0.0)),
+        parts.slide("S", "rod", "sled", (0.8, 0.0, 0.0), (1.0, 0.0, 0.0)),
+    ]
+    gears = {"name": "gears", "joints": ["W", "A"], "ratio": 1.0, "offset": 0.6}
+    tip = {"name": "tip", "body": "sled", "point": [0.8, 0.0, 0.0], "along": [1.0, 0.0, 0.0], **path}
+    given = {"body": [rod, wheel, sled], "joint": joints, "coupling": [gears]}
+    return Scene(name="sled", gravity=DOWN, duration=0.5, driver=[{"joint": "W", **path}, tip], **given)
 
 
 def test_motors_move_a_rod_and_sled_that_an_offset_turns_at_the_start_by_newtons_equations():

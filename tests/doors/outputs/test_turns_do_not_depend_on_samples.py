@@ -30,13 +30,10 @@ CLOSE = 1e-9  # rad, or of the energy: rounding of angles of up to 100 rad over 
 
 def wound_wheel() -> Scene:
     """Return a wheel at rest on a torsion spring, wound up by 40 rad: φ = 40 (1 - cos 2 t) rad."""
-    return Scene(
-        name="wound",
-        duration=END,
-        body=[{"name": "wheel", "mass": 2.0, "inertia": [2.0, 2.0, INERTIA], "position": [0.0, 0.0, 0.0]}],
-        joint=[hinge("H", "ground", "wheel", (0.0, 0.0, 0.0))],
-        load=[{"type": "torsion_spring", "joint": "H", "stiffness": STIFFNESS, "natural_angle": NATURAL}],
-    )
+    wheel = {"name": "wheel", "mass": 2.0, "inertia": [2.0, 2.0, INERTIA], "position": [0.0, 0.0, 0.0]}
+    spring = {"type": "torsion_spring", "joint": "H", "stiffness": STIFFNESS, "natural_angle": NATURAL}
+    joints = [hinge("H", "ground", "wheel", (0.0, 0.0, 0.0))]
+    return Scene(name="wound", duration=END, body=[wheel], joint=joints, load=[spring])
 
 
 def choices(random: np.random.Generator, count: int) -> Iterator[np.ndarray]:

@@ -21,15 +21,13 @@ SIZES = {  # unit of an output → its size in SI, by "mm,deg,kN,ms"
 
 def crank(rate=RATE, size=1.0):
     """A mass on a crank of ``size`` that turns once a second, level at the start, in the plane of gravity."""
-    return mbref.Scene(
-        name="crank",
-        gravity=(0, -G, 0),
-        body=[
-            {"name": "mass", "mass": MASS * size**3, "inertia": [0, 0, 0], "position": [RADIUS * size, 0, 0]}
-        ],
-        joint=[joint("A", "revolute", "ground", "mass", axis=Z)],
-        driver=[{"joint": "A", "polynomial": [0, rate]}],
+    mass = {"mass": MASS * size**3, "inertia": [0, 0, 0], "position": [RADIUS * size, 0, 0]}
+    joints, driver = (
+        [joint("A", "revolute", "ground", "mass", axis=Z)],
+        {"joint": "A", "polynomial": [0, rate]},
     )
+    given = {"body": [{"name": "mass", **mass}], "joint": joints, "driver": [driver]}
+    return mbref.Scene(name="crank", gravity=(0, -G, 0), **given)
 
 
 @pytest.fixture(scope="module")

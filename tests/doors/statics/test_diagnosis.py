@@ -133,11 +133,9 @@ def test_sleeve_between_two_parallel_guides_is_named_with_its_ways_to_move(kind,
     assert f"sleeve {says}" in shown and "moves nothing else" in shown
 
 
-CHAIN = Scene(
-    name="chain",
-    body=[rod("upper", (0.5, 0.0, 0.0)), rod("lower", (1.5, 0.0, 0.0))],
-    joint=[hinge("A", ("ground", "upper")), hinge("B", ("upper", "lower"), (1.0, 0.0, 0.0))],
-)
+RODS = [rod("upper", (0.5, 0.0, 0.0)), rod("lower", (1.5, 0.0, 0.0))]
+PINS = [hinge("A", ("ground", "upper")), hinge("B", ("upper", "lower"), (1.0, 0.0, 0.0))]
+CHAIN = Scene(name="chain", body=RODS, joint=PINS)
 
 
 SPRUNG = CHAIN.with_(

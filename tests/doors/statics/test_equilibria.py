@@ -48,12 +48,8 @@ def test_flat_parallelogram_is_an_equilibrium_at_a_singular_position_and_has_no_
 @pytest.mark.parametrize(("tilt", "found"), [(1e-6, []), (0.0, ["indifferent"])])  # rad
 def test_block_on_a_level_slide_rests_everywhere_and_on_a_tilted_one_nowhere(tilt, found):
     """Along the slide the acceleration is G sin(tilt), a millionth of the weight's, and nothing holds it."""
-    block = Scene(
-        name="block",
-        gravity=(G * np.sin(tilt), -G * np.cos(tilt), 0.0),
-        body=[rod("block", (0.5, 0.0, 0.0))],
-        joint=[slide("S", "block", ORIGIN, (1.0, 0.0, 0.0))],
-    )
+    parts = {"body": [rod("block", (0.5, 0.0, 0.0))], "joint": [slide("S", "block", ORIGIN, (1.0, 0.0, 0.0))]}
+    block = Scene(name="block", gravity=(G * np.sin(tilt), -G * np.cos(tilt), 0.0), **parts)
     assert [each.stability for each in equilibria(block, starts=2)] == found
 
 
@@ -115,13 +111,9 @@ def rods(lengths: np.ndarray, masses: np.ndarray, angles: np.ndarray, load: list
     places = centres(lengths, angles)
     anchors = ends(places)[:-1]
     names = ["ground", *(f"b{k}" for k in range(len(masses)))]
-    return Scene(
-        name="chain",
-        gravity=DOWN,
-        body=[rod(*each) for each in zip(names[1:], places, masses, strict=True)],
-        joint=[hinge(f"J{k}", names[k : k + 2], anchor) for k, anchor in enumerate(anchors)],
-        load=load,
-    )
+    rods = [rod(*each) for each in zip(names[1:], places, masses, strict=True)]
+    hinges = [hinge(f"J{k}", names[k : k + 2], anchor) for k, anchor in enumerate(anchors)]
+    return Scene(name="chain", gravity=DOWN, body=rods, joint=hinges, load=load)
 
 
 @pytest.mark.parametrize("is_on_slide", [False, True])
