@@ -7,7 +7,6 @@ and -f'(q₁) μ to q₁, so that its power is zero.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -41,8 +40,9 @@ def driving_forces(scene: Scene, motion: Trajectory) -> dict[str, np.ndarray]:
     """
     if is_intermittent(scene):
         parts = [driving_forces(*part) for part in parts_of(scene, motion) if part[1].times.size]
-        names = {driver.joint for driver in scene.driver}  # without contacts at end stops
-        return {name: force for name, force in _over_pieces(parts).items() if name in names}
+        names = [driver.joint for driver in scene.driver]  # without contacts at end stops
+        known = names if parts and all(parts) else ()
+        return {name: np.concatenate([part[name] for part in parts]) for name in known}
     driven = [scene.joint_named(driver.joint) for driver in scene.driver]
     unknown: list[dict[Any, Any]] = [{(joint.name, joint.facts.driven): 1.0} for joint in driven]
     unknown += [_slopes(scene, motion, coupling) for coupling in scene.coupling]
@@ -67,12 +67,6 @@ def _slopes(scene: Scene, motion: Trajectory, coupling: Coupling) -> dict[Any, A
         at = along(joint_motion(scene, motion, joint.name), kind)[0] if bent else 0.0
         found[joint.name, kind] = slope(at) / size
     return found
-
-
-def _over_pieces(parts: Sequence[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    """Return forces of consecutive samples as one array (k,) by joint; empty if one part is empty."""
-    names = parts[0] if parts and all(parts) else ()
-    return {name: np.concatenate([part[name] for part in parts]) for name in names}
 
 
 def _demanded(scene: Scene, motion: Trajectory, joint: Joint, coordinate: Coordinate) -> np.ndarray | None:
