@@ -90,8 +90,9 @@ def bounced(after: Scene, before: State, touching: Sequence[End], wanted: Mappin
 
 
 def is_locked(piece: Scene, joint: str, state: State, column: int) -> bool:
-    """Return whether the rows of a piece lock a joint's angle (column 0) or displacement (1) in a state."""
-    rows, _ = jacobian(piece, 0.0, state.position, state.orientation)
+    """Return whether rows of joints and couplings of a piece lock a joint's angle (column 0) or displacement
+    (1) in a state; drivers may move it."""
+    rows, _ = jacobian(piece.with_(driver=[]), 0.0, state.position, state.orientation)
     own = coordinate_jacobian(piece, joint, state.position, state.orientation)[column]
     units = np.tile(np.repeat([1.0, 1 / scene_length(piece)], 3), len(piece.body))
     rows, own = rows * units, own * units / np.linalg.norm(own * units)

@@ -70,12 +70,12 @@ def impact(before: Scene, after: Scene) -> Impact:
 
 
 def is_locked(scene: Scene, joint: str) -> bool:
-    """Return whether the constraints of a scene lock the coordinate of a joint that a driver could prescribe,
-    at the scene's poses: its row is a combination of the other rows."""
-    model = Model(assembled(scene).with_(driver=[*scene.driver, Driver(joint=joint, polynomial=(0.0,))]))
+    """Return whether joints and couplings of a scene lock the coordinate of a joint that a driver could
+    prescribe, at the scene's poses: its row is a combination of theirs. Drivers may move it."""
+    model = Model(assembled(scene).with_(driver=[Driver(joint=joint, polynomial=(0.0,))]))
     root, rows = 1 / np.sqrt(position_weights(model)), model.terms(0.0, model.start()).jacobian
     unit = rows * root / row_lengths(rows * root)[:, None]
-    own = model.structure.row[model.structure.driver == len(scene.driver)][0]
+    own = model.structure.row[model.structure.driver == 0][0]
     others = np.delete(unit, own, axis=0)
     left = unit[own] - others.T @ np.linalg.lstsq(others.T, unit[own], rcond=IMPACT_RANK)[0]
     model.release()

@@ -16,6 +16,7 @@ from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref import Scene, SceneError
 from tests.helpers.coupled_mechanisms import body
+from tests.helpers.intermittent_mechanisms import carts
 from tests.helpers.parts import X, Z, hinge, slide
 
 G, ORIGIN = 10.0, (0.0, 0.0, 0.0)
@@ -261,6 +262,17 @@ def test_stop_is_refused_at_a_driven_joint_in_a_diagnosis_and_by_an_engine_witho
         mbref.diagnose(door())
     assert "joint 'A' has an end stop" in str(engine("exudyn").supports.missing(door()))
     assert "joint 'A' has an end stop with a restitution below" in str(engine("mujoco").cannot(door(0.0)))
+
+
+def test_stop_through_which_a_driver_leads_a_latched_cart_is_refused_at_its_time():
+    """Cart B moves at -1 m/s up to 0.1 s, then with the driven cart A at 2 m/s: at its end, 0.1 m, at 0.2 s.
+    The judge's motion ends there, too."""
+    free = carts(active=[[0.1, 1.0]]).with_(driver=[{"joint": "A", "polynomial": [0.0, 2.0]}])
+    one, two, latch = free.joint
+    stopped = free.with_(joint=[one, {**two.model_dump(), "stop": {"upper": 0.1}}, latch])
+    with pytest.raises(SceneError, match=r"end stops B\.upper: cannot be met at t = 0\.2 s"):
+        mbref.simulate(stopped)
+    assert "contradict" in motion_by(natural_motion, stopped, [0.0, 0.3], EXTENDED).reason
 
 
 def held_by_its_weight(duration: float, force: dict[str, Any]) -> Scene:
