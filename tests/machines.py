@@ -55,9 +55,8 @@ def runs_here(changes: Mapping[str, str]) -> bool:
 def passed_and_failed(name: str, arguments: Sequence[str]) -> tuple[int, int]:
     """Run pytest in a setting, print its failures, and return how many tests pass and fail."""
     command = [sys.executable, "-m", "pytest", "-q", "-rfE", "--tb=no", "-p", "no:cacheprovider", *arguments]
-    done = subprocess.run(
-        command, cwd=ROOT, env=environment(SETTINGS[name]), capture_output=True, text=True, check=False
-    )
+    given = {"cwd": ROOT, "env": environment(SETTINGS[name])}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, **given)
     lines = done.stdout.splitlines()
     for line in lines:
         if line.startswith(("FAILED", "ERROR")):
@@ -86,11 +85,8 @@ def motions(chosen: Sequence[str], scenes: Sequence[str]) -> bool:
     """Print how far motions differ from those of the first setting, and return whether that is little."""
     first: dict[str, list[float]] = {}
     largest = 0.0
-    print(
-        "| setting | scenes equal to the bit | largest difference | scene |",
-        "| --- | --: | --: | --- |",
-        sep="\n",
-    )
+    print("| setting | scenes equal to the bit | largest difference | scene |")
+    print("| --- | --: | --: | --- |")
     for name in chosen:
         command = [sys.executable, "-m", "tests.machines", "--poses", *scenes]
         environ = environment(SETTINGS[name])

@@ -22,11 +22,8 @@ def pages() -> list[Path]:
     """Return the files whose prose is checked; pages made from data are left out."""
     docs = (ROOT / "docs").rglob("*.md")
     made = {"findings.md", "conformance.md"}
-    return [
-        ROOT / "README.md",
-        ROOT / "CHANGELOG.md",
-        *sorted(path for path in docs if path.name not in made),
-    ]
+    others = sorted(path for path in docs if path.name not in made)
+    return [ROOT / "README.md", ROOT / "CHANGELOG.md", *others]
 
 
 def prose(text: str) -> str:

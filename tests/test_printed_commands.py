@@ -40,9 +40,8 @@ def slow(page: str) -> Any:
 def run(words: list[str], folder: Path) -> None:
     """Run a command in a folder, as a reader would."""
     program, *arguments = words
-    ran = subprocess.run(
-        [sys.executable, "-m", program, *arguments], cwd=folder, capture_output=True, text=True, check=False
-    )
+    words = [sys.executable, "-m", program, *arguments]
+    ran = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
     assert ran.returncode == 0, f"{' '.join(words)}: {ran.stdout[-1000:]}{ran.stderr[-1000:]}"
 
 

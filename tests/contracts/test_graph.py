@@ -21,9 +21,7 @@ def graphs(draw: st.DrawFn) -> Scene:
     """Draw scenes of 1 to 6 bodies and up to 9 joints of any kind, between any two of them or the ground."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1), label="seed"))
     n = draw(st.integers(1, 6), label="bodies")
-    bodies = [
-        body(f"b{i}", rng.normal(size=3), rng.normal(size=3), float(rng.uniform(0.5, 2))) for i in range(n)
-    ]
+    bodies = [body(f"b{i}", *rng.normal(size=(2, 3)), float(rng.uniform(0.5, 2))) for i in range(n)]
     names = ["ground", *(b.name for b in bodies)]
     joints = []
     for k, kind in enumerate(draw(st.lists(st.sampled_from(KINDS), max_size=9), label="joints")):
@@ -163,9 +161,8 @@ def test_loops_are_cut_between_links_and_not_at_the_ground_on_request(scene, clo
 def hinged(*pairs: tuple[str, str]) -> Scene:
     """Return bodies at x = 0, 1, 2, … in the order of their names, with parallel hinges between pairs."""
     names = sorted({name for pair in pairs for name in pair} - {"ground"})
-    bodies = [
-        Body(name=n, mass=1.0, inertia=INERTIA, position=(float(k), 1.0, 0.0)) for k, n in enumerate(names)
-    ]
+    parts = {"mass": 1.0, "inertia": INERTIA}
+    bodies = [Body(name=n, position=(float(k), 1.0, 0.0), **parts) for k, n in enumerate(names)]
     joints = [hinge(f"j{k}", *pair, (float(k), 0.0, 0.0)) for k, pair in enumerate(pairs)]
     return Scene(name="hinged", body=bodies, joint=joints)
 

@@ -145,10 +145,8 @@ def test_joint_rates_are_spin_about_and_velocity_along_the_axis():
 def test_initial_velocity_off_a_hinge_is_rounded_up_to_five_percent_and_refused_above():
     """A body at 3 m/s has 4 or 6 % of this speed along the hinge's axis, 0.12 or 0.18 m/s, which the hinge
     forbids. Up to 5 % the judge takes for rounding."""
-    rounded, refused = (
-        scene(body("b", 2.0, 0.0, 0.0, velocity=(0.0, 3.0, along)), joint=(hinge(),))
-        for along in (0.12, 0.18)
-    )
+    moved = (body("b", 2.0, 0.0, 0.0, velocity=(0.0, 3.0, along)) for along in (0.12, 0.18))
+    rounded, refused = (scene(each, joint=(hinge(),)) for each in moved)
     assert constraints.initial_twists(rounded)[0][0] == pytest.approx([0.0, 3.0, 0.0])
     with pytest.raises(SceneError, match=r"joint\[0\] 'A': the given velocities contradict it: off by 0.18"):
         constraints.initial_twists(refused)

@@ -21,10 +21,8 @@ def pushed(crank: float, rod: float, angle: float, speed: float, size: float = 1
     ]
     turns = hinge("O", "ground", "crank", (0.0, 0.0, 0.0)), hinge("P", "crank", "rod", pin)
     joints = [*turns, hinge("Q", "rod", "slider", slider), slide("S", "ground", "slider", slider)]
-    duration, driver = (
-        4.0 * (a + b - slider[0]) / (speed * size),
-        {"joint": "S", "polynomial": [0, speed * size]},
-    )
+    duration = 4.0 * (a + b - slider[0]) / (speed * size)
+    driver = {"joint": "S", "polynomial": [0.0, speed * size]}
     scene = Scene(name="pushed", duration=duration, body=bodies, joint=joints, driver=[driver])
     return scene, (a + b - slider[0]) / (speed * size)
 

@@ -25,10 +25,8 @@ def exact(scene: Scene) -> dict[str, Any]:
     truth = truth_for(scene, reference_time=SECONDS)
     assert truth is not None
     found = truth.poses(times_of(scene))
-    states = {
-        name: np.asarray(getattr(found, name)).tolist()
-        for name in ("position", "orientation", "velocity", "angular_velocity")
-    }
+    names = ("position", "orientation", "velocity", "angular_velocity")
+    states = {name: np.asarray(getattr(found, name)).tolist() for name in names}
     return {"by": truth.name, "bound": truth.accuracy, **states}
 
 

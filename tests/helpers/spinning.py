@@ -70,8 +70,7 @@ def _load(rng: np.random.Generator, joint: Joint) -> TorsionSpring | JointTorque
     if rng.random() < 0.6:
         natural = rng.uniform(-NATURAL, NATURAL)
         stiffness = rng.uniform(0.005, 0.1)
-        return TorsionSpring(
-            joint=joint.name, stiffness=stiffness, damping=rng.uniform(0.0, 0.01), natural_angle=natural
-        )
+        given = {"stiffness": stiffness, "damping": rng.uniform(0.0, 0.01), "natural_angle": natural}
+        return TorsionSpring(joint=joint.name, **given)
     wave = {"amplitude": 1.0, "frequency": rng.uniform(0.5, 6.0), "phase": rng.uniform(0.0, 6.0)}
     return JointTorque(joint=joint.name, torque=rng.uniform(-3.0, 3.0), factor={"sine": wave})

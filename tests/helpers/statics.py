@@ -35,11 +35,8 @@ def parallelogram(sine: float, cosine: float) -> Scene:
     """Return a parallelogram of three links of 1 m on pivots 1 m apart, under gravity 3° from -y. Its crank
     is at the angle from x that has this sine and cosine."""
     x, y = cosine, sine
-    bodies = [
-        rod("crank", (x / 2, y / 2, 0.0)),
-        rod("coupler", (x + 0.5, y, 0.0)),
-        rod("rocker", (1.0 + x / 2, y / 2, 0.0)),
-    ]
+    cranks = rod("crank", (x / 2, y / 2, 0.0)), rod("rocker", (1.0 + x / 2, y / 2, 0.0))
+    bodies = [cranks[0], rod("coupler", (x + 0.5, y, 0.0)), cranks[1]]
     joints = [
         hinge("A", ("ground", "crank")),
         hinge("B", ("crank", "coupler"), (x, y, 0.0)),
@@ -54,13 +51,9 @@ def ball_linkage(ends: tuple[str, str] = ("spherical", "spherical")) -> Scene:
     between joints of two types."""
     bodies = [rod("crank", (0, 0.25, 0.0)), rod("coupler", (0.5, 0.5, 0.1)), rod("rocker", (1.0, 0.25, 0.1))]
     places = ((0.0, 0.5, 0.0), (1.0, 0.5, 0.2))
-    joints = [
-        hinge("A", ("ground", "crank")),
-        hinge("D", ("ground", "rocker"), (1.0, 0.0, 0.0), (0.1, 0.0, 1.0)),
-    ]
-    for name, kind, pair, place in zip(
-        "BC", ends, (("crank", "coupler"), ("coupler", "rocker")), places, strict=True
-    ):
+    tilted = hinge("D", ("ground", "rocker"), (1.0, 0.0, 0.0), (0.1, 0.0, 1.0))
+    joints, pairs = [hinge("A", ("ground", "crank")), tilted], (("crank", "coupler"), ("coupler", "rocker"))
+    for name, kind, pair, place in zip("BC", ends, pairs, places, strict=True):
         axes = {"axes": [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]} if kind == "universal" else {}
         joints.append({"name": name, "type": kind, "bodies": list(pair), "anchor": list(place), **axes})
     return Scene(name="ball_linkage", body=bodies, joint=joints)

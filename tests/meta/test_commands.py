@@ -10,10 +10,8 @@ import crosscheck.cli.parser
 import mbref.cli.commands
 from tests.printed_commands import FOUND, ROOT
 
-PARSERS = {
-    "mbref": functools.cache(mbref.cli.commands.parser),
-    "crosscheck": functools.cache(crosscheck.cli.parser.parser),
-}
+MODULES = {"mbref": mbref.cli.commands, "crosscheck": crosscheck.cli.parser}
+PARSERS = {name: functools.cache(module.parser) for name, module in MODULES.items()}
 
 
 OF_PROGRAMS = [(page, words) for page, words in FOUND if words[0] in PARSERS]

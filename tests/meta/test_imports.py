@@ -67,10 +67,8 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
     ),
 }
 
-MAKING = {
-    *("study", "run", "run_case", "run_here", "run_isolated", "run_estimated", "time_interleaved", "observe"),
-    *("collection",),
-}
+MAKING = {"study", "run", "run_case", "run_here", "run_isolated", "run_estimated", "time_interleaved"}
+MAKING |= {"observe", "collection"}
 MAKERS = (
     "crosscheck.processes",
     "crosscheck.engines",

@@ -17,10 +17,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 LIBRARIES = ("numpy", "scipy.linalg", "scipy.integrate", "scipy.optimize", "scipy.interpolate", "hypothesis")
-LIBRARIES += (
-    *("scipy.sparse.linalg", "pydantic", "numba", "rich.progress"),
-    *("jinja2", "matplotlib.figure", "mujoco"),
-)
+LIBRARIES += ("scipy.sparse.linalg", "pydantic", "numba", "rich.progress", "jinja2", "matplotlib.figure")
+LIBRARIES += ("mujoco",)
 TESTS = ("tests/doors", "tests/contracts", "tests/properties", "tests/reports")
 BUDGET = 60.0  # CPU s of the tests of a mutant
 
@@ -35,12 +33,9 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, metavar="S", help="default: 1")
     parser.add_argument("--count", type=int, default=50, metavar="N", help="default: 50")
     parser.add_argument("--only", nargs="+", default=(), metavar="PATH", help="paths of sources begin so")
-    parser.add_argument(
-        "--tests", nargs="+", default=TESTS, metavar="PATH", help=f"default: {' '.join(TESTS)}"
-    )
-    parser.add_argument(
-        "--budget", type=float, default=BUDGET, metavar="S", help="CPU s for a mutant's tests"
-    )
+    shown = f"default: {' '.join(TESTS)}"
+    parser.add_argument("--tests", nargs="+", default=TESTS, metavar="PATH", help=shown)
+    parser.add_argument("--budget", type=float, default=BUDGET, metavar="S", help="CPU s of a mutant's tests")
     parser.add_argument("--list", action="store_true", help="print the mutants, run nothing")
     options = parser.parse_args()
     prepare()
@@ -58,15 +53,13 @@ def main() -> int:
     results = {}
     for k, mutant in enumerate(chosen, 1):
         results[mutant], by = copy.result(mutant)
-        print(
-            f"{k:3} of {len(chosen)}: {results[mutant]} {mutant.file}:{mutant.line} {by}".rstrip(), flush=True
-        )
+        line = f"{k:3} of {len(chosen)}: {results[mutant]} {mutant.file}:{mutant.line} {by}"
+        print(line.rstrip(), flush=True)
     print(*table([(mutant.file, result == KILLED) for mutant, result in results.items()]), sep="\n")
     for mutant, result in results.items():
         if result != KILLED:
-            print(
-                f"\n{mutant.file}:{mutant.line} {mutant.kind}, {result}", *mutant.difference(ROOT), sep="\n"
-            )
+            head = f"\n{mutant.file}:{mutant.line} {mutant.kind}, {result}"
+            print(head, *mutant.difference(ROOT), sep="\n")
     return 0
 
 

@@ -36,10 +36,8 @@ EXTREMES = {
 UNCHANGED = {"min", "max", "minimum", "maximum", "hypot", "isclose", "allclose"}
 UNCHANGED |= {"logical_or", "logical_and", "dot", "inner", "array_equal"}
 """Functions that give the same for arguments in any order."""
-KINDS = (
-    *("sign", "factor", "comparison", "constant", "index", "extreme", "argument order", "statement"),
-    *("condition", "bodies"),
-)
+KINDS = ("sign", "factor", "comparison", "constant", "index", "extreme", "argument order", "statement")
+KINDS += ("condition", "bodies")
 
 
 class Mutant(NamedTuple):
@@ -222,8 +220,5 @@ def _conditions(node: ast.AST) -> Changes:
     if isinstance(node, ast.If | ast.While):
         yield "condition", node.test, f"(not ({ast.unparse(node.test)}))"
     if isinstance(node, ast.IfExp):
-        yield (
-            "bodies",
-            node,
-            (f"({ast.unparse(node.orelse)} if {ast.unparse(node.test)} else {ast.unparse(node.body)})"),
-        )
+        orelse, test, body = (ast.unparse(part) for part in (node.orelse, node.test, node.body))
+        yield "bodies", node, f"({orelse} if {test} else {body})"

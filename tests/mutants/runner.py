@@ -4,6 +4,7 @@ plain Python (``NUMBA_DISABLE_JIT=1``)."""
 
 import compileall
 import contextlib
+import functools
 import hashlib
 import itertools
 import json
@@ -73,9 +74,8 @@ class Copy:
         found, part = read(path), path.with_suffix(".part")
         while not path.exists():
             left = [test.name for test in read(part)]
-            _, answer = _forked(
-                self.place, lambda out, left=left: _record(file, left, part, out), 20 * self.limit
-            )
+            work = functools.partial(_record, file, left, part)
+            _, answer = _forked(self.place, work, 20 * self.limit)
             if answer or len(read(part)) == len(left):  # at the end, or no test was begun
                 part.touch()
                 part.rename(path)

@@ -77,9 +77,8 @@ def test_json_of_a_run_has_the_fields_of_a_record_and_the_engines_states(capsys,
 def two(tmp_path, monkeypatch) -> tuple[str, ...]:
     """Arguments of `run` with two bodies at rest, without a closed form, and an empty cache of references."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    path = saved(
-        tmp_path, "two", body=[rod(n, (1.0, y, 3.0), inertia=1.0) for n, y in (("a", 0), ("b", 2.0))]
-    )
+    blocks = [rod(name, (1.0, y, 3.0), inertia=1.0) for name, y in (("a", 0.0), ("b", 2.0))]
+    path = saved(tmp_path, "two", body=blocks)
     return ("run", path, "--engine", FAKE, "--setting", "plain", "--samples", "3")
 
 
@@ -138,9 +137,8 @@ def test_a_faulty_option_is_refused_with_status_two_and_its_reason(capsys, still
 def test_every_fault_of_a_scene_file_is_reported_with_its_line(capsys, tmp_path):
     """Gravity is in line 2, the body's table begins in line 3, and its mass is in line 5."""
     path = tmp_path / "bad.toml"
-    path.write_text(
-        'name = "bad"\ngravity = [0, 0]\n[[body]]\nname = "a"\nmass = -1.0\nposition = [0, 0, 0]\n'
-    )
+    body = '[[body]]\nname = "a"\nmass = -1.0\nposition = [0, 0, 0]\n'
+    path.write_text(f'name = "bad"\ngravity = [0, 0]\n{body}')
     status, out, err = run_main(capsys, "run", str(path), "--json")
     assert (status, out) == (2, ""), (status, out)
     assert err.splitlines() == [
@@ -164,19 +162,17 @@ def test_a_velocity_that_contradicts_a_joint_is_reported_once_with_the_joints_li
 
 
 @pytest.mark.parametrize(
-    ("others", "wanted_status", "run_scene"),
+    ("others", "ended", "run"),
     [([], 2, ""), (["free"], 0, "free")],
     ids=["no scene is left", "another scene is run"],
 )
-def test_a_scene_that_an_engine_cannot_run_is_left_out_with_the_reason(
-    capsys, tmp_path, others, wanted_status, run_scene
-):
+def test_a_scene_that_an_engine_cannot_run_is_left_out_with_the_reason(capsys, tmp_path, others, ended, run):
     """The engine FAKE refuses loads. If no scene is left, standard output has no JSON."""
     loaded = saved(tmp_path, "loaded", load=(Moment(body="block", moment=(1.0, 0.0, 0.0)),))
     scenes = [loaded, *(saved(tmp_path, name) for name in others)]
     status, out, err = run_main(capsys, "run", *scenes, "--engine", FAKE, "--json")
     assert "fake cannot run loaded: this fake has no loads" in err and FAKE not in err, err
-    assert (status, json.loads(out)["scene"] if out else "") == (wanted_status, run_scene), (status, out)
+    assert (status, json.loads(out)["scene"] if out else "") == (ended, run), (status, out)
 
 
 def test_an_engine_without_its_package_is_left_out_with_the_command_that_installs_it(capsys, still):
@@ -263,10 +259,8 @@ def test_option_with_one_setting_runs_it_once_without_a_sweep(capsys, still):
 def test_printed_command_of_a_record_repeats_its_run(capsys, still):
     """Two records have other samples, options and outcomes; 1/3 needs all digits of a double."""
     scene = Scene.from_file(still).with_(duration=0.3)
-    asked = [
-        (np.linspace(0, 0.3, 4), {"seconds": 1 / 3}),
-        (np.array([0.1, 0.25]), {"seconds": 0.5, "outcome": "NOT_FINITE"}),
-    ]
+    other = np.array([0.1, 0.25]), {"seconds": 0.5, "outcome": "NOT_FINITE"}
+    asked = [(np.linspace(0, 0.3, 4), {"seconds": 1 / 3}), other]
     cases = [grid.Case(scene, times, FAKE, grid.Setting("a b", options)) for times, options in asked]
     records = grid.study(cases)
     assert [record["outcome"] for record in records] == ["COMPLETED", "NOT_FINITE"]

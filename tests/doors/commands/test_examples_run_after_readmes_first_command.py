@@ -74,9 +74,8 @@ def output(python: Path, tmp_path: Path, *words: str | Path) -> str:
     """Return the output of Python in an empty directory, which stays empty."""
     command, outside = [python, *words], {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
     limit = 600  # s; Pinocchio compiles C++ code
-    run = subprocess.run(
-        command, cwd=tmp_path, env=outside, capture_output=True, text=True, timeout=limit, check=False
-    )
+    given = {"cwd": tmp_path, "env": outside, "timeout": limit}
+    run = subprocess.run(command, capture_output=True, text=True, check=False, **given)
     assert run.returncode == 0, f"{words[-1]}: status {run.returncode}: {run.stderr[-800:]}"
     assert not list(tmp_path.iterdir()), f"{words[-1]} left {list(tmp_path.iterdir())}"
     return run.stdout

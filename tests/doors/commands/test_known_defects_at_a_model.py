@@ -80,11 +80,8 @@ def three_links() -> Scene:
     places = ((0.4, 0.1, 0.2), (1.4, 0.1, 0.2), (1.4, 0.6, 0.7))
     link = {"mass": 1.0, "inertia": [0.05, 0.06, 0.07]}
     links = [{"name": f"link{k}", "position": place, **link} for k, place in enumerate(places)]
-    balls = {
-        ("link0", "link1"): (1, 0, 0),
-        ("link1", "link2"): (1, 0.5, 0.5),
-        ("link2", "ground"): (1.5, 0.7, 0.8),
-    }
+    pairs = ("link0", "link1"), ("link1", "link2"), ("link2", "ground")
+    balls = dict(zip(pairs, ((1, 0, 0), (1, 0.5, 0.5), (1.5, 0.7, 0.8)), strict=True))
     joints = [hinge("A", "ground", "link0", (0.0, 0.0, 0.0))]
     joints += [joint("-".join(pair), "spherical", *pair, at) for pair, at in balls.items()]
     return Scene(name="links", gravity=(0.0, 0.0, -9.81), body=links, joint=joints)

@@ -146,9 +146,8 @@ def test_printed_command_of_a_run_names_the_file_with_its_import_options(tmp_pat
     times = np.linspace(0, scene.duration, 3)
     record = run_here(Case(scene, times, "mujoco", setting_of(scene, AS_IN_FILE), 5.0, 0.0))
     said = command(record, "robot.xml --without limits --keyframe tilted")
-    assert said.startswith(
-        "crosscheck run robot.xml --without limits --keyframe tilted --engine mujoco --setting 'as in file'"
-    )
+    read = "crosscheck run robot.xml --without limits --keyframe tilted"
+    assert said.startswith(f"{read} --engine mujoco --setting 'as in file'")
     assert "solref=" in said and "file=" not in said
 
 

@@ -71,11 +71,8 @@ def test_a_comparison_refuses_an_unknown_depth_or_engine():
 def test_runs_of_one_engine_follow_each_other_and_do_not_wait_for_their_measurement():
     """Two engines have three runs each, of 20 ms, so that overlapping runs of an engine would be seen. Each
     measurement waits until all six runs have ended: it would wait for ever if a run waited for one."""
-    cases = [
-        Case(BLOCK, np.array([0.0, 1.0]), name, Setting("f", {"k": k}))
-        for k in range(3)
-        for name in ("first", "second")
-    ]
+    times, each = np.array([0.0, 1.0]), [(k, name) for k in range(3) for name in ("first", "second")]
+    cases = [Case(BLOCK, times, name, Setting("f", {"k": k})) for k, name in each]
     going, order, all_run = set(), [], threading.Event()
 
     def run(asked):

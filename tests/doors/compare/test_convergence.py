@@ -105,9 +105,8 @@ def made(step: float, power: float, bias: float) -> Trajectory:
     turn = rotations.from_vector([0.0, off / 2, 0.0])
     sign = -1.0 if step == 0.1 else 1.0
     shift = off * scene_length(SCENE) * np.array([1.0, 0.0, 0.0])
-    return replace(
-        TRUTH, position=TRUTH.position + shift, orientation=sign * rotations.multiply(turn, TRUTH.orientation)
-    )
+    turned = sign * rotations.multiply(turn, TRUTH.orientation)
+    return replace(TRUTH, position=TRUTH.position + shift, orientation=turned)
 
 
 @pytest.mark.parametrize("power, bias", [(1.0, 1e-4), (2.0, 0.0), (2.0, 3e-5), (4.0, 1e-6)])

@@ -103,9 +103,8 @@ def test_records_of_another_version_of_a_scene_are_left_out(tmp_path):
     decides which records count; without a file the last record does."""
     scene = Scene(name="s", body=(Body(name="b", mass=1.0, inertia=(1.0,) * 3, position=(0.0,) * 3),))
     heavier = scene.with_(body=(scene.body[0].model_copy(update={"mass": 2.0}),))
-    place = stored(
-        tmp_path, {"key": "k1", "mechanism": mechanism(scene)}, {"key": "k2", "mechanism": mechanism(heavier)}
-    )
+    named = zip(("k1", "k2"), (scene, heavier), strict=True)
+    place = stored(tmp_path, *({"key": key, "mechanism": mechanism(each)} for key, each in named))
     assert [record["key"] for record in load(place).values()] == ["k2"]
     (place / "scenes").mkdir()
     scene.save(place / "scenes" / "s.toml")

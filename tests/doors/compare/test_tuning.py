@@ -56,9 +56,8 @@ class Modelled:
 
     def cases(self, *steps: float) -> list[Case]:
         times = np.array([0.0, 1.0])
-        return [
-            Case(SCENE, times, f"{FAKES}:FAKE", Setting(f, {"step": h})) for f in self.families for h in steps
-        ]
+        settings = [Setting(family, {"step": h}) for family in self.families for h in steps]
+        return [Case(SCENE, times, f"{FAKES}:FAKE", setting) for setting in settings]
 
 
 def found(engine: Modelled, level: float, *steps: float, ours: tuple[str, ...] = ()) -> dict[str, float]:
@@ -83,9 +82,8 @@ def test_cheapest_setting_is_no_more_accurate_than_needed():
     done = tuned(engine.cases(0.1, 0.01, 0.001), 1e-3, engine)
     [cheapest] = done.reached
     assert cheapest["metrics"]["error"] > 1e-4, cheapest
-    assert cheapest["cost"]["rhs"] == min(
-        r["cost"]["rhs"] for r in done.records if r["metrics"]["error"] <= 1e-3
-    )
+    good = [r["cost"]["rhs"] for r in done.records if r["metrics"]["error"] <= 1e-3]
+    assert cheapest["cost"]["rhs"] == min(good)
     assert 0.001 not in [h for _, h in engine.asked]
 
 
@@ -118,9 +116,8 @@ def test_family_more_expensive_than_the_cheapest_is_abandoned():
 def test_inaccurate_family_is_abandoned_once_its_run_costs_twice_the_cheapest(seconds, steps):
     """At h = 0.1 "cheap" has the error h² = 0.01, as wanted, and runs for 0.1 s; "other" has an error of 4 h²
     and needs h = 0.05, which is tried only if its run at h = 0.1 took less than 0.2 s."""
-    engine = Modelled(
-        cheap=Family(order=2.0, cost=0.01), other=Family(order=2.0, factor=4.0, cost=0.1 * seconds)
-    )
+    other = Family(order=2.0, factor=4.0, cost=0.1 * seconds)
+    engine = Modelled(cheap=Family(order=2.0, cost=0.01), other=other)
     found(engine, 1.001e-2, 0.1, 0.05)
     assert [h for family, h in engine.asked if family == "other"][:2] == steps, engine.asked
 
@@ -128,9 +125,8 @@ def test_inaccurate_family_is_abandoned_once_its_run_costs_twice_the_cheapest(se
 def test_cheap_integrator_of_crosscheck_does_not_end_the_search_of_engine_families():
     """Family "ours" costs 1e-6 of "own"; both are tuned. "slower" costs more than "own" and is abandoned. The
     error h² of "own" reaches 1e-4 at h = 1e-2."""
-    engine = Modelled(
-        ours=Family(order=8.0, cost=1e-6), own=Family(order=2.0, cost=1.0), slower=Family(order=1.0, cost=1.0)
-    )
+    theirs = {"own": Family(order=2.0, cost=1.0), "slower": Family(order=1.0, cost=1.0)}
+    engine = Modelled(ours=Family(order=8.0, cost=1e-6), **theirs)
     both = found(engine, 1e-4, 0.1, 0.01, 0.001, 0.0001, ours=("ours",))
     assert list(both) == ["ours", "own"], both
     assert 1e-2 / FOUND_TO < both["own"] <= 1e-2
@@ -183,9 +179,8 @@ def test_settings_of_steps_longer_than_the_samples_allow_are_not_chosen():
 
 def test_cheapest_step_by_closure_gap_counts_distances_and_no_angles():
     """The block is h² m off: 1 mm at √1e-3 s; it is also tilted by 0.5 rad, which does not count."""
-    scene = SCENE.with_(
-        joint=[{"name": "A", "type": "fixed", "bodies": ["ground", "b"], "anchor": [2.0, 0.0, 0.0]}]
-    )
+    weld = {"name": "A", "type": "fixed", "bodies": ["ground", "b"], "anchor": [2.0, 0.0, 0.0]}
+    scene = SCENE.with_(joint=[weld])
     tilt = rotations.from_vector(np.array([0.5, 0.0, 0.0])).tolist()
     rates = {"velocity": [[0.0] * 3] * 2, "angular_velocity": [[0.0] * 3] * 2}
     known = {"engine": "fake", "version": "1", "method": "", "settings": {}, "message": "", "reactions": {}}

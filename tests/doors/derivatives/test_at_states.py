@@ -39,11 +39,7 @@ def of(name: str, scene: Scene, numbers: list[str]) -> dict[str, np.ndarray]:
     values = {part: getattr(found, part)[row] for part in parts}
     for part in parts:
         assert (getattr(errors, part)[row] <= 1e-9 * max(1.0, np.abs(values[part]).max(initial=0.0))).all()
-    return {
-        **values,
-        "by_position": values["by_position"] / turn,
-        "by_velocity": values["by_velocity"] / turn,
-    }
+    return values | {key: values[key] / turn for key in ("by_position", "by_velocity")}
 
 
 def trammel(along: float = ALONG) -> Scene:

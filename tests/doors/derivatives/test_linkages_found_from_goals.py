@@ -198,9 +198,8 @@ def test_least_torque_moves_the_mass_to_the_height_of_the_pivot_and_its_lower_bo
     """A mass at (x, y) from the pivot needs the torque m g (x cos φ - y sin φ), of mean square (m g)² (x² +
     y²) / 2 over a turn: the least has y = 0 and x at its lower bound, 0.1 m."""
     times = np.linspace(0.0, 1.0, 17)[:-1]
-    found = mbref.synthesise(
-        arm(0.5, 0.2), ARM, least=["driver(A).torque"], bounds={ARM[0]: (0.1, 1.0)}, times=times, starts=1
-    )
+    wanted = {"least": ["driver(A).torque"], "bounds": {ARM[0]: (0.1, 1.0)}}
+    found = mbref.synthesise(arm(0.5, 0.2), ARM, times=times, starts=1, **wanted)
     assert found.numbers[ARM[0]] == 0.1 and found.at_bounds == {ARM[0]: "lower"}
     assert found.numbers[ARM[1]] == pytest.approx(0.0, abs=FOUND)
     square = (2.0 * 9.81 * 0.1) ** 2 / 2

@@ -52,9 +52,8 @@ def test_error_of_a_malformed_answer_names_its_defect(damage: str, words: str):
 
 def test_only_a_failed_run_may_answer_with_the_first_samples_alone():
     """Two of the three requested times are a good answer of a run that failed, not of one that completed."""
-    failed, completed = (
-        FAKE.run(SCENE, TIMES[:2], Setting("a", {"outcome": name})) for name in ("STEP_FAILED", "COMPLETED")
-    )
+    settings = (Setting("a", {"outcome": name}) for name in ("STEP_FAILED", "COMPLETED"))
+    failed, completed = (FAKE.run(SCENE, TIMES[:2], setting) for setting in settings)
     assert well_formed(failed, SCENE, TIMES).times.tolist() == [0.0, 0.1]
     with pytest.raises(MalformedAnswer, match="completed with 2 of 3 samples"):
         well_formed(completed, SCENE, TIMES)

@@ -44,9 +44,8 @@ def integrate(
     n = len(y)
 
     def function(_: int, t: float, state: int, out: int) -> int:
-        numbers, slopes = (
-            np.ctypeslib.as_array(ctypes.cast(a, ctypes.POINTER(ctypes.c_double)), (n,)) for a in (state, out)
-        )
+        pointers = (ctypes.cast(array, ctypes.POINTER(ctypes.c_double)) for array in (state, out))
+        numbers, slopes = (np.ctypeslib.as_array(pointer, (n,)) for pointer in pointers)
         try:
             slopes[:] = rates(t, numbers)
         except ArithmeticError:
@@ -210,10 +209,8 @@ def test_a_failed_run_of_mujocos_compiled_family_has_the_samples_before_its_end(
     three tolerances or more. Failed runs have finite samples, fewer than asked, and end within the motion."""
     pytest.importorskip("mujoco")
     scene = SCENES["planar_slider_crank_equal"]()
-    runs = [
-        simulate("mujoco", scene, 21, FAMILY, rtol=rtol, min_step=1e-3, beta=30.0, hard=1e-9)
-        for rtol in (1e-4, 1e-6, 1e-9)
-    ]
+    given = {"min_step": 1e-3, "beta": 30.0, "hard": 1e-9}
+    runs = [simulate("mujoco", scene, 21, FAMILY, rtol=rtol, **given) for rtol in (1e-4, 1e-6, 1e-9)]
     failed = [run for run in runs if run.outcome is not Outcome.COMPLETED]
     assert failed and all(run.message for run in failed)
     assert all(0 < len(run.times) < 21 and 0 < run.t_end < scene.duration for run in failed)

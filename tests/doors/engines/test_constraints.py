@@ -80,11 +80,8 @@ class Consistent:
         phi = constraints.closure(*place)
         bias = constraints.closure_accelerations(*place, self.v, self.w, still, still)
         none = np.zeros(0)
-        return (
-            np.concatenate([none, *phi.values()]),
-            constraints.jacobian(*place)[0],
-            -np.concatenate([none, *bias.values()]),
-        )
+        residuals, biases = (np.concatenate([none, *of.values()]) for of in (phi, bias))
+        return residuals, constraints.jacobian(*place)[0], -biases
 
 
 class Differences(NamedTuple):

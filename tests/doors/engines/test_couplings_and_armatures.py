@@ -65,9 +65,8 @@ def needs_what_is_missing(name, make):
     return name in LACKS and parts[LACKS[name]]
 
 
-PAIRS = [
-    pytest.param(name, make, id=f"{name}-{make.__name__}") for name in (*FINE, *FAMILIES) for make in EVERY
-]
+OF_ENGINES = [(name, make) for name in (*FINE, *FAMILIES) for make in EVERY]
+PAIRS = [pytest.param(name, make, id=f"{name}-{make.__name__}") for name, make in OF_ENGINES]
 
 
 @pytest.mark.parametrize(("name", "make"), [pair for pair in PAIRS if needs_what_is_missing(*pair.values)])
@@ -164,10 +163,8 @@ def test_engine_moves_a_coupling_with_offset_as_the_reference(name):
 def test_mujocos_adapter_refuses_a_scene_that_is_not_assembled():
     """Poses of the file violate the coupling's offset. The reason names it, and the remedy."""
     refusal = engine("mujoco").cannot(shifted(gear_pair, "teeth", 0.4))
-    assert refusal is not None
-    assert refusal.reason == (
-        "coupling 'teeth' has an offset (mbref.assembled(scene) has none), which the adapter does not map"
-    )
+    said = "coupling 'teeth' has an offset (mbref.assembled(scene) has none), which the adapter does not map"
+    assert refusal is not None and refusal.reason == said
 
 
 def test_coordinates_of_a_reference_table_count_from_the_file_s_poses():

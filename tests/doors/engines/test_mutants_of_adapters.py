@@ -134,11 +134,8 @@ def planted(name: str, defect: dict[str, str], folder: Path) -> Engine:
 def test_each_text_that_a_defect_replaces_is_once_in_its_file():
     """A defect replaces its text, which has to be unique. `make deep` plants most of the over 90 defects."""
     planned = [(package(way), defect) for way, found in DEFECTS.items() for defect in found]
-    missing = [
-        (name, defect)
-        for name, defect in planned
-        if place_of(name, defect, FOLDER).read_text().count(defect["text"]) != 1
-    ]
+    counts = [place_of(name, defect, FOLDER).read_text().count(defect["text"]) for name, defect in planned]
+    missing = [each for each, count in zip(planned, counts, strict=True) if count != 1]
     assert len(planned) > 90 and not missing, missing
 
 

@@ -58,9 +58,8 @@ def incline(bodies: tuple[str, str], joints: int = 1) -> Scene:
     """A block that slides on an inclined plane and spins about the normal, held off its centre of mass."""
     twist = {"velocity": SPEED * ALONG, "angular_velocity": RATE * NORMAL}
     block = Body(name="block", mass=MASS, inertia=INERTIA, position=PLACE, orientation=TURNED, **twist)
-    planes = tuple(
-        Planar(name=f"plane{k}", bodies=bodies, anchor=ANCHOR + k * ALONG, axis=NORMAL) for k in range(joints)
-    )
+    given = {"bodies": bodies, "axis": NORMAL}
+    planes = tuple(Planar(name=f"plane{k}", anchor=ANCHOR + k * ALONG, **given) for k in range(joints))
     return Scene(name="incline", gravity=GRAVITY, duration=0.5, body=(block,), joint=planes)
 
 

@@ -40,9 +40,8 @@ def test_warp_sweeps_the_finest_step_only_with_loops_or_couplings() -> None:
     precision, sweeps the finest step of every scene; a heavy top has neither loops nor couplings."""
     for scene, omitted in ((SCENES["heavy_top"](), 1), (SCENES["bennett"](), 0), (screw()[0], 0)):
         for family in OWN_STEPS:
-            of_mjx, of_warp = (
-                [s.options["step"] for s in engine(n).settings(scene) if s.family == family] for n in PORTS
-            )
+            given = (engine(port).settings(scene) for port in PORTS)
+            of_mjx, of_warp = ([s.options["step"] for s in all_ if s.family == family] for all_ in given)
             assert of_warp and of_warp == of_mjx[: len(of_mjx) - omitted], family
 
 
@@ -91,10 +90,8 @@ def test_single_and_double_precision_differ_by_rounding(name: str, mechanism: st
 
 def bare(scene: Scene) -> Scene:
     """The scene without loads, couplings and armatures."""
-    joints = [
-        joint.model_copy(update={"armature": 0.0}) if getattr(joint, "armature", 0) else joint
-        for joint in scene.joint
-    ]
+    without = {"armature": 0.0}
+    joints = [j.model_copy(update=without if getattr(j, "armature", 0) else {}) for j in scene.joint]
     return scene.with_(load=(), coupling=(), joint=joints)
 
 
@@ -124,10 +121,8 @@ def test_port_moves_loads_couplings_and_armatures_as_the_reference(name: str) ->
     run = engine(name).run(scene, times, Setting("stock", {"step": 1e-3}))
     assert run.outcome is Outcome.COMPLETED, run.message
     exact = at_the_end(scene, times)
-    effect, off = (
-        apart(at_the_end(bare(scene), times), exact),
-        apart((run.position[-1], run.orientation[-1]), exact),
-    )
+    effect = apart(at_the_end(bare(scene), times), exact)
+    off = apart((run.position[-1], run.orientation[-1]), exact)
     for body, wrong, by_parts in zip(scene.body, off, effect, strict=True):
         assert wrong < 1e-3 * by_parts, f"{body.name}: {wrong:.1e} of {by_parts:.1e}"
 

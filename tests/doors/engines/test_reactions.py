@@ -37,10 +37,8 @@ def door(kind: type) -> Scene:
     """A door hung in two joints of one kind on a vertical axis, 1 m apart."""
     axis = {"axis": Z} if kind is Revolute else {}
     leaf = Body(name="leaf", mass=10.0, inertia=(1.2, 0.9, 0.4), position=(0.4, 0.0, 1.0))
-    hinges = [
-        kind(name=n, bodies=("ground", "leaf"), anchor=(0.0, 0.0, h), **axis)
-        for n, h in (("low", 0.5), ("high", 1.5))
-    ]
+    heights, bodies = {"low": 0.5, "high": 1.5}, ("ground", "leaf")
+    hinges = [kind(name=n, bodies=bodies, anchor=(0.0, 0.0, h), **axis) for n, h in heights.items()]
     return Scene(name="door", gravity=(0.0, 0.0, -9.81), duration=0.1, body=(leaf,), joint=tuple(hinges))
 
 

@@ -134,9 +134,8 @@ def test_random_mechanisms_in_random_order_together_equal_single_runs():
     scenes = []
     for seed in range(8):
         scene = random_mechanism(seed)
-        scenes += variants(
-            scene, [Variation("body[0].position[0]", *(scene.body[0].position[0] + d for d in (0.0, 0.1)))], 3
-        )
+        place = scene.body[0].position[0]
+        scenes += variants(scene, [Variation("body[0].position[0]", place, place + 0.1)], 3)
     order = np.random.default_rng(0).permutation(len(scenes))
     assert not compared([scenes[k] for k in order], np.linspace(0.0, 0.02, 3)).differing
 
@@ -167,9 +166,8 @@ def test_variants_of_springs_and_full_inertias_together_equal_single_runs():
 )
 def test_variants_by_methods_of_each_kind_together_equal_single_runs(method):
     """``compared`` runs three variants in a batch and alone; none differs in a bit."""
-    assert not compared(
-        list(variants(CRANK, [MASS, LENGTH], 3)), np.linspace(0.0, 0.01, 3), method=method
-    ).differing
+    scenes = list(variants(CRANK, [MASS, LENGTH], 3))
+    assert not compared(scenes, np.linspace(0.0, 0.01, 3), method=method).differing
 
 
 def test_run_of_an_ensemble_is_equal_after_pickling():

@@ -133,9 +133,8 @@ def test_controls_and_forces_of_motors_are_clipped_as_in_mujoco(files):
         "<motor joint='JOINT' forcerange='-0.5 0.5' gear='2'/>",
         "<motor joint='JOINT' gear='2'/>",
     ]
-    text = model_of(parts, "name='k' ctrl='3 3 3'").replace(
-        "<joint name='j2'", "<joint name='j2' actuatorfrcrange='-1.5 1.5'"
-    )
+    text = model_of(parts, "name='k' ctrl='3 3 3'")
+    text = text.replace("<joint name='j2'", "<joint name='j2' actuatorfrcrange='-1.5 1.5'")
     scene, _ = files.scene(text, "a.xml", "--keyframe", "k")
     theirs = accelerations(text, 1)
     assert of_scene(scene) == pytest.approx(theirs, abs=ROUNDED * np.abs(theirs).max())

@@ -51,11 +51,8 @@ def test_part_with_a_number_that_is_huge_or_not_finite_is_named(files, text, nam
     assert expected in files.refusal(text.replace(old, new.format(number)), name)
 
 
-READERS = [
-    ("a.xml", "MuJoCo cannot read it: "),
-    ("a.urdf", "a.urdf: is no XML: "),
-    ("a.sdf", "a.sdf: is no XML: "),
-]
+OTHERS = [(name, f"{name}: is no XML: ") for name in ("a.urdf", "a.sdf")]
+READERS = [("a.xml", "MuJoCo cannot read it: "), *OTHERS]
 NO_XML = [b"", b"\xff\xfe\x00<", bytes(range(256)), b"<robot", b"<sdf version='1.9'><model", b"[1, 2]"]
 
 

@@ -86,9 +86,6 @@ def test_an_engine_in_the_working_directory_is_found(tmp_path, monkeypatch) -> N
 
 def test_the_example_engine_imports_from_crosscheck_engine_alone() -> None:
     """Statements ``from … import`` name this module only; others are numpy and the standard library."""
-    found = {
-        n.module
-        for n in ast.walk(ast.parse((TINY / "tiny_engine.py").read_text()))
-        if isinstance(n, ast.ImportFrom)
-    }
+    nodes = ast.walk(ast.parse((TINY / "tiny_engine.py").read_text()))
+    found = {node.module for node in nodes if isinstance(node, ast.ImportFrom)}
     assert found == {"crosscheck.engine"}, found

@@ -107,9 +107,8 @@ def test_spring_between_coincident_points_must_have_the_natural_length_zero():
     spring = {"type": "spring", "bodies": ["leaf", "bolt"], "points": [[1, 0, 2], [1, 0, 2]], "stiffness": 5}
     data = copy.deepcopy(VALID)
     place = len(data["load"])
-    assert (
-        Scene(**data | {"load": [*data["load"], spring | {"natural_length": 0}]}).load[place].stiffness == 5
-    )
+    loads = [*data["load"], spring | {"natural_length": 0}]
+    assert Scene(**data | {"load": loads}).load[place].stiffness == 5
     faults = faults_of(data | {"load": [*data["load"], spring | {"natural_length": 0.1}]})
     assert len(faults) == 1 and faults[0].startswith(f"load[{place}].natural_length: must be 0"), faults
 

@@ -161,10 +161,8 @@ def with_hinges(*axes, height: float = 0.0) -> Scene:
     rod and slider of the given axes, at a height above the plane (m)."""
     scene = find_scene("planar_slider_crank")
     x, y, _ = scene.joint_named("C").anchor
-    further = [
-        Revolute(name=f"T{k}", bodies=("rod", "slider"), anchor=(x, y, height), axis=axis)
-        for k, axis in enumerate(axes)
-    ]
+    given = {"bodies": ("rod", "slider"), "anchor": (x, y, height)}
+    further = [Revolute(name=f"T{k}", axis=axis, **given) for k, axis in enumerate(axes)]
     return scene.with_(joint=(*scene.joint, *further))
 
 
@@ -376,7 +374,5 @@ def test_progress_in_a_pipe_prints_at_most_a_line_in_ten_seconds(capsys):
     lines = Lines("simulating", 2.0, lambda: next(now))
     for done in (0.1, 0.5, 0.6, 1.5):
         lines(done)
-    assert capsys.readouterr().err.splitlines() == [
-        "simulating: 25 %, about 36 s left",
-        "simulating: 75 %, about 10 s left",
-    ]
+    printed = "simulating: 25 %, about 36 s left", "simulating: 75 %, about 10 s left"
+    assert capsys.readouterr().err.splitlines() == [*printed]

@@ -17,11 +17,8 @@ ROUNDED = 1e-12  # m: some roundings of frames within 1 m
 
 
 def roll_pitch_yaw(turn) -> list[float]:
-    return [
-        np.arctan2(turn[2, 1], turn[2, 2]),
-        np.arcsin(np.clip(-turn[2, 0], -1, 1)),
-        np.arctan2(turn[1, 0], turn[0, 0]),
-    ]
+    roll, yaw = np.arctan2(turn[2, 1], turn[2, 2]), np.arctan2(turn[1, 0], turn[0, 0])
+    return [roll, np.arcsin(np.clip(-turn[2, 0], -1, 1)), yaw]
 
 
 def pose_text(base, inner, more: str = "") -> str:
@@ -236,10 +233,8 @@ def test_joint_of_the_world_connects_two_models_in_a_world_frame(tmp_path):
     """Frame f is 5 m along y; models p and q are 1 m and 2 m from it along x. Each has a link a, 1 m above
     the model, with its centre 0.1 m along x. The hinge joins both links at the link of q."""
     link = LINK.format(name="a", pose="0 0 1 0 0 0", centre="0.1 0 0")
-    models = [
-        f'<model name="{m}"><pose relative_to="f">{x} 0 0 0 0 0</pose>{link}</model>'
-        for m, x in (("p", 1), ("q", 2))
-    ]
+    poses = {name: f'<pose relative_to="f">{x} 0 0 0 0 0</pose>' for name, x in (("p", 1), ("q", 2))}
+    models = [f'<model name="{name}">{pose}{link}</model>' for name, pose in poses.items()]
     frame = '<frame name="f"><pose>0 5 0 0 0 0</pose></frame>'
     joint = HINGE.format(name="J", kind="revolute", parent="p::a", child="q::a", more="")
     text = f'<sdf version="1.10"><world name="w">{frame}{"".join(models)}{joint}</world></sdf>'

@@ -53,9 +53,8 @@ def test_links_without_inertial_and_worlds_without_gravity_get_sdf_s_defaults(tm
 )
 def test_link_element_that_changes_the_motion_is_refused_or_left_out(old, new, kind, sentence, tmp_path):
     """The error and the list of what is left out name the element, the link and the option ``--without``."""
-    with pytest.raises(
-        SceneError, match=f"{sentence}: it changes the motion; --without {kind} leaves it out"
-    ):
+    says = f"{sentence}: it changes the motion; --without {kind} leaves it out"
+    with pytest.raises(SceneError, match=says):
         read(tmp_path, LINK.replace(old, new))
     found = read(tmp_path, LINK.replace(old, new), without=[kind])
     assert found.left_out == (f"{sentence} (--without {kind})",)

@@ -16,9 +16,8 @@ def finger(version: str) -> str:
     """Return a model whose link is turned about x, with a hinge along y; 1.4 means y of the model."""
     link = LINK.format(name="tip", pose="0 0 0 1.5707963267948966 0 0", centre="0.1 0 0")
     hinge = HINGE.format(name="knuckle", kind="revolute", parent="world", child="tip", more="")
-    return (
-        f'<sdf version="{version}"><model name="finger"><pose>0 7 0 0 0 0</pose>{link}{hinge}</model></sdf>'
-    )
+    model = f'<model name="finger"><pose>0 7 0 0 0 0</pose>{link}{hinge}</model>'
+    return f'<sdf version="{version}">{model}</sdf>'
 
 
 @pytest.mark.parametrize(("version", "axis"), [("1.4", (0, 1, 0)), ("1.10", (0, 0, 1))])
@@ -58,9 +57,8 @@ def gears(parent: str = "one", child: str = "two", sense: int = 1, swapped: bool
     """Return two wheels on a frame that turns, and a gearbox between them."""
     names = ("frame", "one", "two")
     centres = ("0.05 0 0", "0.1 0 0.02", "-0.08 0 0.1")
-    links = "".join(
-        LINK.format(name=n, pose="0 0 1 0 0 0", centre=c) for n, c in zip(names, centres, strict=True)
-    )
+    placed = zip(names, centres, strict=True)
+    links = "".join(LINK.format(name=n, pose="0 0 1 0 0 0", centre=c) for n, c in placed)
     ends = [("world", "frame"), ("frame", "one"), ("two", "frame") if swapped else ("frame", "two")]
     hinges = "".join(
         HINGE.format(name=f"of {n}", kind="revolute", parent=first, child=second, more="")

@@ -7,9 +7,8 @@ import pytest
 
 import mbref
 
-INERTIA = (
-    "<inertial><mass>2</mass><inertia><ixx>0.02</ixx><iyy>0.03</iyy><izz>0.04</izz></inertia></inertial>"
-)
+MOMENTS = "<inertia><ixx>0.02</ixx><iyy>0.03</iyy><izz>0.04</izz></inertia>"
+INERTIA = f"<inertial><mass>2</mass>{MOMENTS}</inertial>"
 
 
 def link(name: str, pose: str = "0 0 0 0 0 0", inertia: str = INERTIA) -> str:

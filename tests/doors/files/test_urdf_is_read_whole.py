@@ -129,9 +129,8 @@ def test_prefix_without_a_declaration_is_read_as_by_parsers_without_namespaces(f
 
 def test_limits_without_a_range_are_named(files):
     """The format's default of both ends is 0, which would lock the joint; engines read it as no limit."""
-    free = hinge("ja", "base", "a", "0 0 0", more='<limit effort="1" velocity="1"/>').replace(
-        "continuous", "revolute"
-    )
+    limits = '<limit effort="1" velocity="1"/>'
+    free = hinge("ja", "base", "a", "0 0 0", more=limits).replace("continuous", "revolute")
     _, out = files.scene(robot(free, *CRANKS[1:]), "r.urdf")
     assert "limits of joints 'ja': lower and upper are 0 or missing; the joints are free" in out
 

@@ -214,9 +214,8 @@ def cases(explained: bool) -> list[object]:
         for name, case in {**EVERYWHERE, **MORE, **SIMULATED, **own}.items():
             is_slow = scene != "spinning_rod" or name in MORE
             if (case[1] is not NOTHING) == explained and (scene != "spinning_rod" or "gravity" not in name):
-                found.append(
-                    pytest.param(scene, *case, id=f"{scene}-{name}", marks=[pytest.mark.slow] * is_slow)
-                )
+                named = {"id": f"{scene}-{name}", "marks": [pytest.mark.slow] * is_slow}
+                found.append(pytest.param(scene, *case, **named))
     return found
 
 

@@ -78,12 +78,8 @@ def test_drivers_that_a_moment_on_the_ground_cannot_replace_are_refused():
 
 def block(name: str = "b", **parts: Any) -> Body:
     """Return a body at rest at (1, 2, 0) m, or with other fields."""
-    given = {
-        "mass": 3.0,
-        "inertia": (0.3, 0.4, 0.5),
-        "position": (1.0, 2.0, 0.0),
-        "velocity": (0.0, 0.0, 0.0),
-    }
+    given = {"mass": 3.0, "inertia": (0.3, 0.4, 0.5)}
+    given |= {"position": (1.0, 2.0, 0.0), "velocity": (0.0, 0.0, 0.0)}
     return Body(name=name, **{**given, "angular_velocity": (0.0, 0.0, 0.0), **parts})
 
 

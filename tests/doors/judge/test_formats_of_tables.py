@@ -16,9 +16,8 @@ SCENES = {"double_pendulum": double_pendulum, "spinning_rod": spinning_rod}
 GATE, DEEP = 8, 100  # numbers of random tables for `make check` and for `make deep`
 SHARE = 1e-3  # fraction of a column's range, above which the verdict "right" must state the rounding
 TOLERANCE = 1e-8  # the judge's default tolerance, relative to the size of a quantity
-seeds = pytest.mark.parametrize(
-    "seed", [pytest.param(k, marks=[pytest.mark.slow] * (k >= GATE)) for k in range(DEEP)]
-)
+CASES = [pytest.param(k, marks=[pytest.mark.slow] * (k >= GATE)) for k in range(DEEP)]
+seeds = pytest.mark.parametrize("seed", CASES)
 
 
 @functools.cache
@@ -34,9 +33,8 @@ def random_part(seed: int) -> tuple[np.random.Generator, Scene, Table, str]:
     rng = np.random.default_rng(seed)
     name = str(rng.choice(list(SCENES)))
     table = exact(name)
-    columns = rng.permutation([n for n in table if n != "time" and np.ptp(table[n]) > 0.01])[
-        : rng.integers(2, 9)
-    ]
+    moving = [n for n in table if n != "time" and np.ptp(table[n]) > 0.01]
+    columns = rng.permutation(moving)[: rng.integers(2, 9)]
     start, count = int(rng.integers(0, 20)), int(rng.integers(12, 22))
     part = {n: table[n][start : start + count] for n in ("time", *sorted(columns))}
     return rng, SCENES[name](), part, str(rng.choice(list(FORMATS)))

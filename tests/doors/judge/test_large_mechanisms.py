@@ -91,9 +91,8 @@ def test_check_alternatives_finds_the_wrong_sparse_jacobian_of_mujoco_4_0_0():
     """MuJoCo 4.0.0 factorises some sparse matrices of several loops wrongly, so that its accelerations differ
     by more than a tenth from its other ways; 3.17.0 does not."""
     mujoco = pytest.importorskip("mujoco")
-    found = suite.verdict_on(
-        "alternatives", set_up(InProcess(engine("mujoco")), Specimen(large_graph(5), large=True))
-    )
+    trial = set_up(InProcess(engine("mujoco")), Specimen(large_graph(5), large=True))
+    found = suite.verdict_on("alternatives", trial)
     is_wrong = mujoco.__version__ == "4.0.0"
     assert found.status == (suite.FAIL if is_wrong else suite.PASS), found
     assert not is_wrong or (found.measured > 0.1 and "'Newton, sparse" in found.reason), found

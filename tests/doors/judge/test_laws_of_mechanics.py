@@ -84,9 +84,8 @@ def test_velocities_and_accelerations_are_differences_of_neighbouring_poses_and_
 
 def state_of(scene: Scene, run: Trajectory, k: int) -> tuple[np.ndarray, ...]:
     """Return position, orientation, velocities and the angles of turning loads at a sample."""
-    angles = constraints.joint_coordinates(
-        scene, run.times, run.position, run.orientation, run.angular_velocity
-    )
+    state = run.position, run.orientation, run.angular_velocity
+    angles = constraints.joint_coordinates(scene, run.times, *state)
     turned = np.array([angles[load.joint][k, 0] for load in turning_loads(scene)])
     return run.position[k], run.orientation[k], run.velocity[k], run.angular_velocity[k], turned
 

@@ -107,9 +107,8 @@ def test_metrics_do_not_depend_on_the_order_of_bodies():
     """The run's bodies are listed in another order than the scene's; sums differ by rounding."""
     order = [2, 0, 1]
     keys = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
-    shuffled = replace(
-        EXACT, bodies=tuple(EXACT.bodies[i] for i in order), **{k: getattr(EXACT, k)[:, order] for k in keys}
-    )
+    arrays = {key: getattr(EXACT, key)[:, order] for key in keys}
+    shuffled = replace(EXACT, bodies=tuple(EXACT.bodies[i] for i in order), **arrays)
     assert measure(SCENE, shuffled, TRUTH) == pytest.approx(measure(SCENE, EXACT, TRUTH), abs=1e-14)
 
 

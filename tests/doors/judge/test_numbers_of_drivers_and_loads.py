@@ -17,10 +17,8 @@ INERTIA, ARMATURE, RATE = 0.3, 1.1, 2.4  # kg m², kg m², rad/s²
 def driven(armature: float = 0.0, ratio: float | None = None) -> Scene:
     """Return a disc that a driver accelerates evenly, with a second disc at a gear if there is a ratio."""
     bodies = [rod(name, (k, 0, 0), 1.0, INERTIA) for k, name in enumerate(("first", "second"))]
-    hinges = [
-        hinge("A", "ground", "first", (0, 0, 0), armature=armature),
-        hinge("B", "ground", "second", (1, 0, 0)),
-    ]
+    motor = hinge("A", "ground", "first", (0, 0, 0), armature=armature)
+    hinges = [motor, hinge("B", "ground", "second", (1, 0, 0))]
     count = 1 if ratio is None else 2
     gears = [Coupling(name="gear", joints=("A", "B"), ratio=ratio)] if ratio else []
     parts = {"body": bodies[:count], "joint": hinges[:count], "coupling": gears}

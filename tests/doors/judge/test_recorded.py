@@ -15,9 +15,8 @@ from tests.helpers.tables import double_pendulum
 
 TIMES = np.linspace(0.0, 0.4, 81)
 SCENE = double_pendulum()
-SPRING = Spring(
-    bodies=("ground", "lower"), points=((1.0, 0.5, 0.2), (0.9, 0.1, 0.0)), stiffness=30.0, natural_length=0.3
-)
+ENDS = {"bodies": ("ground", "lower"), "points": ((1.0, 0.5, 0.2), (0.9, 0.1, 0.0))}
+SPRING = Spring(**ENDS, stiffness=30.0, natural_length=0.3)
 SPRUNG = SCENE.with_(load=[SPRING])  # without a spring only ratios of masses matter
 
 
@@ -39,9 +38,8 @@ def another_point(table) -> dict[str, np.ndarray]:
     q = np.array([table[f"lower.orientation.{a}"] for a in "wxyz"]).T
     arm = rotations.rotate(q, np.array([0.1, -0.2, 0.05]))
     kept = {n: c for n, c in table.items() if "velocity" not in n}
-    return kept | {
-        f"lower.position.{a}": kept[f"lower.position.{a}"] + arm[:, i] for i, a in enumerate("xyz")
-    }
+    names = [f"lower.position.{axis}" for axis in "xyz"]
+    return kept | {name: kept[name] + arm[:, i] for i, name in enumerate(names)}
 
 
 def lighter(body: str, factor: float) -> list[Body]:
@@ -170,9 +168,8 @@ def test_chosen_columns_have_the_units_and_places_of_their_headers(headers, colu
     wanted = [table["lower.position.x"] * 1e3] * 2
     if "q" in headers:
         wanted = [table[f"lower.orientation.{a}"] for a in "xyzw"]
-    rows = "\n".join(
-        ",".join(map(repr, row)) for row in zip(*(c.tolist() for c in (TIMES, *wanted)), strict=True)
-    )
+    numbers = zip(*(column.tolist() for column in (TIMES, *wanted)), strict=True)
+    rows = "\n".join(",".join(map(repr, row)) for row in numbers)
     (tmp_path / "run.csv").write_text(f"time,{headers}\n{rows}\n")
     assert judge_motion(SCENE, read(tmp_path / "run.csv", SCENE, columns, order=order)).is_right
 

@@ -236,13 +236,9 @@ def test_isostatic_scene_along_a_motion_has_no_singular_position():
     weakened by the rank along the motion do not, and contradict each other by less than 1e-17."""
     scene = SCENES["bennett"]()
     motion = natural_motion(scene, np.linspace(0.0, 1.0, 41), EXTENDED, seconds=SECONDS)
-    along = list(
-        zip(motion.times.tolist(), doubles(motion.position), doubles(motion.orientation), strict=True)
-    )
-    one, other = (
-        natural_motion(s, [1.0], EXTENDED, seconds=SECONDS)
-        for s in (isostatic(scene), isostatic(scene, along))
-    )
+    poses = doubles(motion.position), doubles(motion.orientation)
+    weakened = isostatic(scene), isostatic(scene, list(zip(motion.times.tolist(), *poses, strict=True)))
+    one, other = (natural_motion(each, [1.0], EXTENDED, seconds=SECONDS) for each in weakened)
     assert one.crossings and not other.crossings
     assert other.contradiction < 1e-17 < motion.contradiction
 

@@ -36,11 +36,8 @@ QUICK = {  # relation of the conformance suite: scenes of its quick cases; all o
     **dict.fromkeys(("turned", "translated", "reordered", "relabelled", "stretched"), ("driven slide",)),
     **dict.fromkeys(("duplicated", "satisfied", "negated"), ("driven slide",)),
 }
-CASES = [
-    pytest.param(r, s, marks=[] if s in QUICK.get(r, ()) else [pytest.mark.slow])
-    for r in RELATIONS
-    for s in SCENES
-]
+EACH = [(relation, scene) for relation in RELATIONS for scene in SCENES]
+CASES = [pytest.param(r, s, marks=[pytest.mark.slow] * (s not in QUICK.get(r, ()))) for r, s in EACH]
 
 
 def exact(scene: Scene, times: np.ndarray) -> Trajectory:

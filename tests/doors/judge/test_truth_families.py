@@ -159,10 +159,8 @@ def door(tilt):
     """A body on two hinges, the axis of the second tilted (rad)."""
     body = Body(name="door", position=(0.5, 0.0, 0.5), mass=1.0, inertia=(0.1, 0.2, 0.15))
     axes = {"A": (0.0, (0.0, 0.0, 1.0)), "B": (1.0, (tilt, 0.0, 1.0))}
-    hinges = tuple(
-        Revolute(name=name, bodies=("ground", "door"), anchor=(0, 0, z), axis=axis)
-        for name, (z, axis) in axes.items()
-    )
+    pair = ("ground", "door")
+    hinges = [Revolute(name=n, bodies=pair, anchor=(0, 0, z), axis=axis) for n, (z, axis) in axes.items()]
     return Scene(name="door", gravity=(0, -9.81, 0), body=(body,), joint=hinges)
 
 

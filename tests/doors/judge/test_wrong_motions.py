@@ -35,10 +35,8 @@ def double_hinge() -> Scene:
     """Return two blocks on skew hinges under gravity; the first one begins to turn."""
     first = turning_about((0.0, 0.0, 0.0), SKEW, 3.0, block("a", (0.4, 0.1, -0.1)))
     second = turning_about((0.0, 0.0, 0.0), SKEW, 3.0, block("b", (0.9, 0.3, 0.2), 0.7))
-    joints = [
-        hinge("A", "ground", "a", (0.0, 0.0, 0.0), SKEW),
-        hinge("B", "a", "b", (0.6, 0.2, 0.1), (0.6, 0.0, 0.8)),
-    ]
+    other = hinge("B", "a", "b", (0.6, 0.2, 0.1), (0.6, 0.0, 0.8))
+    joints = [hinge("A", "ground", "a", (0.0, 0.0, 0.0), SKEW), other]
     return made("double hinge", [first, second], joints)
 
 

@@ -56,9 +56,8 @@ def test_mechanisms_of_all_seeds_and_names_equal_the_stored_ones():
     for name, signatures in found.items():
         for k, (one, other) in enumerate(zip(signatures, wanted[name], strict=True)):
             off = np.abs(np.subtract(one[1:], other[1:])).max()
-            assert one[0] == other[0] and off <= ACCURACY * other[-1], (
-                f"{name}, mechanism {k}: another mechanism, {off:.1e} off"
-            )
+            says = f"{name}, mechanism {k}: another mechanism, {off:.1e} off"
+            assert one[0] == other[0] and off <= ACCURACY * other[-1], says
 
 
 @pytest.mark.slow

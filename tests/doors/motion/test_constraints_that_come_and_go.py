@@ -57,10 +57,8 @@ def test_evenly_spaced_sample_that_rounding_puts_before_an_event_has_the_state_a
 def test_pendulum_that_a_second_pivot_catches_keeps_its_angular_momentum_about_this_pivot():
     """I ω + m r × v about the pivot, which is 0.3 m from the rod's centre, with I = m (1 m)² / 12 and m = 2
     kg. The samples are after the event: their energy is constant."""
-    pivots = [
-        *pendulum(0.3).joint,
-        joint("Q", "spherical", "rod", "ground", (0.8, 0.0, 0.0), active=[[0.3, 2.0]]),
-    ]
+    second = joint("Q", "spherical", "rod", "ground", (0.8, 0.0, 0.0), active=[[0.3, 2.0]])
+    pivots = [*pendulum(0.3).joint, second]
     motion = mbref.simulate(pendulum(0.3, joint=pivots), times=[0.3, 1.0])
     (event,) = motion.events
     arm = (0.5 - 0.8) / 0.5 * event.position[0]  # m; to the centre, at 0.5 m, from the new pivot, at 0.8 m

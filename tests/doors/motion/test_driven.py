@@ -51,10 +51,8 @@ def test_accelerations_of_a_driven_crank_and_rod_of_equal_length_are_the_closed_
         Revolute(name="C", bodies=c.bodies, anchor=c.anchor, axis=Z),
         Cylindrical(name="D", bodies=d.bodies, anchor=d.anchor, axis=d.axis),
     )
-    bodies = [
-        body.model_copy(update={"position": tuple(np.add(body.position, shift).tolist())})
-        for body in base.body
-    ]
+    places = [{"position": tuple(np.add(body.position, shift).tolist())} for body in base.body]
+    bodies = [body.model_copy(update=at) for body, at in zip(base.body, places, strict=True)]
     scene = base.with_(body=tuple(bodies), joint=joints, driver=(Driver(joint="A", polynomial=(0.0, rate)),))
     rtol = 1e-12
     run = simulate(scene, "taylor", np.linspace(0.0, 2.5, 41), Limits(rtol=rtol, code=code))

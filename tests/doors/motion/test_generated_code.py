@@ -45,10 +45,8 @@ def test_generated_code_follows_a_motion_that_turns_back(name):
     """Generated code uses the power equation, except at low speed, where the motion turns back: the
     velocities, projected on their first values, change their sign. General kernels give equal positions."""
     times, rtol = np.linspace(0.0, 4.0, 41), 1e-11
-    generic, own = (
-        simulate(SCENES[name](), "taylor", times, Limits(rtol=rtol, code=code))
-        for code in ("generic", "generated")
-    )
+    limits = (Limits(rtol=rtol, code=code) for code in ("generic", "generated"))
+    generic, own = (simulate(SCENES[name](), "taylor", times, each) for each in limits)
     along = (own.velocity * own.velocity[1]).sum(axis=(1, 2))
     assert own.outcome == Outcome.COMPLETED and along.min() < 0.0 < along.max(), "it turns back"
     assert np.abs(generic.position - own.position).max() < ROUNDING  # m; links have about 1 m
@@ -60,10 +58,8 @@ def test_runs_by_generated_code_and_general_kernels_agree_in_poses_reactions_and
     the largest value, or of 1 if that is larger, as singular positions magnify rounding. Numbers of steps may
     differ by a twentieth, or by one for each crossing: rounding decides on the step after a crossing."""
     times = np.linspace(0.0, 0.2, 5)
-    generic, own = (
-        simulate(SCENES[name](), ORDER_16, times, Limits(rtol=1e-11, code=code))
-        for code in ("generic", "generated")
-    )
+    limits = (Limits(rtol=1e-11, code=code) for code in ("generic", "generated"))
+    generic, own = (simulate(SCENES[name](), ORDER_16, times, each) for each in limits)
     assert generic.outcome == own.outcome and len(own.times) == len(times), own.message
     assert np.abs(generic.position - own.position).max() < 100 * ROUNDING
     assert np.abs(generic.orientation - own.orientation).max() < 100 * ROUNDING

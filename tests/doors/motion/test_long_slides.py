@@ -20,11 +20,8 @@ def beads(joints: list[Entry], length: float) -> Scene:
     turning = {"mass": 1.0, "inertia": (0.1 * length**2,) * 3, "angular_velocity": (0.0, 0.0, SPEED)}
     bodies = [{"name": "arm", "position": (0.0, 0.0, 0.0), **turning}]
     bodies += [{"name": name, **moving, **turning} for name in ("bead", "follower")]
-    joints = [
-        hinge("A", "ground", "arm", (0, 0, 0)),
-        joint("S", "cylindrical", "arm", "bead", axis=X),
-        *joints,
-    ]
+    rail = joint("S", "cylindrical", "arm", "bead", axis=X)
+    joints = [hinge("A", "ground", "arm", (0, 0, 0)), rail, *joints]
     driver = [{"joint": "A", "polynomial": (0.0, SPEED)}]
     return Scene(name="beads", duration=END, gravity=(0, 0, 0), body=bodies, joint=joints, driver=driver)
 

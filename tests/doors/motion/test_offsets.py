@@ -125,9 +125,8 @@ def test_ends_of_springs_move_with_their_bodies_into_the_assembled_pose():
 
 def test_offset_that_no_pose_obeys_is_refused():
     """The rocker of a four-bar turns back before it reaches the offset of 200°, 3.49 rad."""
-    scene = coupled_loops().with_(
-        coupling=[{"name": "g", "joints": ["left D", "right D"], "ratio": -1.0, "offset": "200 deg"}]
-    )
+    gears = {"name": "g", "joints": ["left D", "right D"], "ratio": -1.0, "offset": "200 deg"}
+    scene = coupled_loops().with_(coupling=[gears])
     with pytest.raises(SceneError, match=r"no pose obeys the offsets of g \(3\.49\d*\); after \d+ %"):
         mbref.simulate(scene)
 

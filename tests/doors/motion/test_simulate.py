@@ -145,8 +145,6 @@ def test_name_of_a_method_is_parsed_and_printed_in_full(name):
 def test_first_step_of_the_length_of_the_run_is_its_only_step(integrator):
     """The run takes 1e-4 s at rtol 1e-3. With a first step of a tenth of it more steps are needed."""
     scene, method = SCENES["planar_slider_crank"](), f"mpi-svd+none/{integrator}"
-    steps = [
-        simulate(scene, method, [1e-4], Limits(rtol=1e-3, first_step=first)).cost.steps
-        for first in (1e-4, 1e-5)
-    ]
+    limits = (Limits(rtol=1e-3, first_step=first) for first in (1e-4, 1e-5))
+    steps = [simulate(scene, method, [1e-4], each).cost.steps for each in limits]
     assert steps[0] == 1 < steps[1], f"{integrator}: {steps} steps with the first of 1e-4 and 1e-5 s"

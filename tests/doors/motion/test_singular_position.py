@@ -19,12 +19,8 @@ from mbref.scenes.planar_slider_crank import slider_crank
 from tests.helpers.measured import relative_error
 from tests.helpers.parts import hinge, rod
 
-WATCHING = (
-    "alf-dual+projection",
-    "mpi-svd+projection",
-    "mpi-gs+projection/adams",
-    "alf+projection/rk4[step=1e-3]",
-)
+WATCHING = ("alf-dual+projection", "mpi-svd+projection", "mpi-gs+projection/adams")
+WATCHING += ("alf+projection/rk4[step=1e-3]",)
 REGULARISED = ("alf-dual+none", "alf-dual+baumgarte", "alf+none")
 LOOPS = {
     "four": (four_bar_gravity(0.3, "four"), 1.0),
@@ -65,18 +61,16 @@ def test_run_that_watches_the_rank_ends_at_the_first_singular_position(loop, met
     assert "lose rank" in run.message and "taylor does" in run.message
 
 
-@pytest.mark.parametrize(
-    "scene",
-    [LOOPS["four"][0], LOOPS["five"][0], find_scene("four_bar_chain[3]")],
-    ids=lambda scene: scene.name,
-)
+FLAT = LOOPS["four"][0], LOOPS["five"][0], find_scene("four_bar_chain[3]")
+
+
+@pytest.mark.parametrize("scene", FLAT, ids=lambda scene: scene.name)
 def test_message_names_the_joints_that_lose_rank_and_no_joint_beside_them(scene):
     """All joints of a loop take part where its links are in line: in a four-bar, a five-bar, and three loops
     of a chain that are flat at once. The hinge of a pendulum beside them does not."""
     beside = (rod("bob", (9.0, 0.0, 0.0), (9.5, 0.0, 0.0)), hinge("beside", "ground", "bob", (9.0, 0.0, 0.0)))
-    both = Scene.model_validate(
-        {**scene.model_dump(), "body": [*scene.body, beside[0]], "joint": [*scene.joint, beside[1]]}
-    )
+    parts = {"body": [*scene.body, beside[0]], "joint": [*scene.joint, beside[1]]}
+    both = Scene.model_validate({**scene.model_dump(), **parts})
     message = simulate(both, "alf-dual+projection", [2.0]).message
     assert [j.name for j in both.joint if repr(j.name) not in message] == ["beside"], message
 

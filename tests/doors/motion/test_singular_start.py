@@ -71,10 +71,8 @@ def falling_parallelogram(rate: float, length: float = 0.3) -> Scene:
     crank, *others = [{"name": n, **equal, "position": (x, 0.0, 0.0)} for n, x in centres.items()]
     crank |= {"angular_velocity": (0.0, 0.0, rate), "velocity": (0.0, rate * length / 2, 0.0)}
     names = (GROUND, *centres, GROUND)
-    pins = [
-        parts.hinge(f"P{k}", names[k], names[k + 1], (x, 0.0, 0.0))
-        for k, x in enumerate((0.0, length, length + 0.5, 0.5))
-    ]
+    places = enumerate((0.0, length, length + 0.5, 0.5))
+    pins = [parts.hinge(f"P{k}", names[k], names[k + 1], (x, 0.0, 0.0)) for k, x in places]
     return Scene(name="falls", gravity=(0.0, -9.81, 0.0), body=[crank, *others], joint=pins)
 
 
@@ -152,11 +150,8 @@ def spherical_loop(crank: float, coupler: float, angle: float, rates: tuple[floa
     first, last = arc(0.0), arc(coupler)
     a = turned(first, angle, arc(crank))
     c = turned(last, 2.0 * math.atan(ratio(crank, coupler) * math.tan(angle / 2)), arc(coupler + crank))
-    links = (
-        ("crank", first + a, rates[0] * first),
-        ("rod", a + c, None),
-        ("rocker", last + c, rates[1] * last),
-    )
+    ends = ("crank", first + a, rates[0] * first), ("rocker", last + c, rates[1] * last)
+    links = (ends[0], ("rod", a + c, None), ends[1])
     bodies = [{**rod(name, 0.4 * place, 1.0, 0.1), "angular_velocity": rate} for name, place, rate in links]
     pairs = ((GROUND, "crank"), ("crank", "rod"), ("rod", "rocker"), (GROUND, "rocker"))
     places = zip("ABCD", pairs, (first, a, c, last), strict=True)

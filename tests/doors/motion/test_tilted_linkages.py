@@ -46,14 +46,10 @@ def scissor(plane: Plane, start: float) -> tuple[Scene, list]:
     """Return two equal bars that cross in their middles, on pin and slider; centres as functions of e^iθ."""
     z = 0.6 * np.exp(1j * start)
     places = [lambda z: z / 2, lambda z: z / 2, lambda z: z.real + 0j]
-    bodies = (
-        plane.body("up", z / 2, start),
-        plane.body("down", z / 2, np.pi - start),
-        plane.body("slider", z.real + 0j, 0.0),
-    )
-    slide = Translational(
-        name="S", bodies=(GROUND, "slider"), anchor=plane.point(z.real + 0j), axis=plane.vector(1.0 + 0j)
-    )
+    cranks = plane.body("up", z / 2, start), plane.body("down", z / 2, np.pi - start)
+    bodies = (*cranks, plane.body("slider", z.real + 0j, 0.0))
+    place = {"anchor": plane.point(z.real + 0j), "axis": plane.vector(1.0 + 0j)}
+    slide = Translational(name="S", bodies=(GROUND, "slider"), **place)
     joints = (
         plane.hinge("A", (GROUND, "up"), 0j),
         plane.hinge("M", ("up", "down"), z / 2),
@@ -67,10 +63,8 @@ def bar_on_cranks(plane: Plane, start: float) -> tuple[Scene, list]:
     """Return a bar on three equal cranks, one of which is redundant; centres as functions of e^iθ."""
     e, pins = np.exp(1j * start), [0j, 0.4 + 0j, 0.8 + 0j]
     places = [lambda e: 0.3 * e + 0.4, *(lambda e, p=p: p + 0.15 * e for p in pins)]
-    bodies = (
-        plane.body("bar", places[0](e), 0.0),
-        *(plane.body(f"c{k}", places[1 + k](e), start) for k in range(3)),
-    )
+    cranks = [plane.body(f"c{k}", places[1 + k](e), start) for k in range(3)]
+    bodies = (plane.body("bar", places[0](e), 0.0), *cranks)
     joints = []
     for k, pin in enumerate(pins):
         joints += [plane.hinge("ABC"[k], (GROUND, f"c{k}"), pin)]

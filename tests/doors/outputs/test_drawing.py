@@ -118,10 +118,8 @@ def test_names_in_an_animation_do_not_overlap_in_any_frame(turning):
 def test_names_of_joints_near_each_other_do_not_overlap(gap, names):
     """A bar of 1 m has three pins, two of them near each other: 1 mm apart, less than a pixel, they share one
     name; farther apart, though their signs touch, all three and the bar have names of their own."""
-    joints = [
-        {"name": f"pin{x:g}", "type": "spherical", "bodies": ("ground", "bar"), "anchor": (x, 0, 0)}
-        for x in (0.0, gap, 1.0)
-    ]
+    ball = {"type": "spherical", "bodies": ("ground", "bar")}
+    joints = [{"name": f"pin{x:g}", "anchor": (x, 0, 0), **ball} for x in (0.0, gap, 1.0)]
     found = labels(still(Scene(name="near", body=[{"name": "bar", "position": (0.5, 0, 0)}], joint=joints)))
     assert not overlapping(found) and len(found) == names, found
 
@@ -176,17 +174,14 @@ def test_animation_is_replaced_by_a_still_for_readers_who_prefer_reduced_motion(
 def test_motions_side_by_side_share_scale_and_time_and_a_shorter_one_stops(turning):
     """Three motions, of 300, the first 100 and all 300 samples, are two in a row; every third is a frame."""
     scene, motion = turning
-    short = dataclasses.replace(
-        motion, **{name: getattr(motion, name)[:100] for name in ("times", "position", "orientation")}
-    )
+    first = {name: getattr(motion, name)[:100] for name in ("times", "position", "orientation")}
+    short = dataclasses.replace(motion, **first)
     picture = side_by_side(scene, {"whole": motion, "<part>": short, "again": motion}, "three")
     root = ET.fromstring(picture)
     assert {"whole", "<part>", "again"} <= set(texts(picture)) and root.find(f"{SVG}title").text == "three"
     panels = list(root.find(f"{SVG}g").findall(f"{SVG}svg"))
-    frames = [
-        [line.find(f"{SVG}animate").attrib["values"].split(";") for line in lines_of(panel)]
-        for panel in panels
-    ]
+    moved = ([line.find(f"{SVG}animate") for line in lines_of(panel)] for panel in panels)
+    frames = [[each.attrib["values"].split(";") for each in panel] for panel in moved]
     assert frames[0] == frames[2] and len(frames[0]) == len(scene.body)
     for whole, part in zip(frames[0], frames[1], strict=True):
         assert part[:33] == whole[:33] and set(part[34:]) == {part[-1]}, "it stays at its last sample"

@@ -22,11 +22,9 @@ SIZES = {  # unit of an output → its size in SI, by "mm,deg,kN,ms"
 def crank(rate=RATE, size=1.0):
     """A mass on a crank of ``size`` that turns once a second, level at the start, in the plane of gravity."""
     mass = {"mass": MASS * size**3, "inertia": [0, 0, 0], "position": [RADIUS * size, 0, 0]}
-    joints, driver = (
-        [joint("A", "revolute", "ground", "mass", axis=Z)],
-        {"joint": "A", "polynomial": [0, rate]},
-    )
-    given = {"body": [{"name": "mass", **mass}], "joint": joints, "driver": [driver]}
+    driver = {"joint": "A", "polynomial": [0, rate]}
+    pivot = joint("A", "revolute", "ground", "mass", axis=Z)
+    given = {"body": [{"name": "mass", **mass}], "joint": [pivot], "driver": [driver]}
     return mbref.Scene(name="crank", gravity=(0, -G, 0), **given)
 
 

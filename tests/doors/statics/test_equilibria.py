@@ -207,10 +207,8 @@ def test_linkage_whose_coupler_spins_idly_has_the_equilibria_of_one_whose_univer
     """No force turns the free coupler about its axis, so that its centre rests at the places of the held one.
     Its spin adds two eigenvalues, which are zero within their bounds: poses that are stable with the
     universal joint become indifferent."""
-    free, held = (
-        equilibria(ball_linkage((end, "spherical")).with_(gravity=gravity), 4)
-        for end in ("spherical", "universal")
-    )
+    scenes = (ball_linkage((end, "spherical")) for end in ("spherical", "universal"))
+    free, held = (equilibria(scene.with_(gravity=gravity), 4) for scene in scenes)
     assert {each.stability for each in held} == {"stable", "unstable"}
     expected = sorted({"stable": "indifferent", "unstable": "unstable"}[each.stability] for each in held)
     assert sorted(each.stability for each in free) == expected
