@@ -259,4 +259,4 @@ def _largest(motion: Motion, units: Sequence[str]) -> Iterator[str]:
         name, found = max(maxima.items(), key=lambda item: item[1].force)
         unit, size = unit_of_column("force", units)
         at = f"in joint {name} at t = {found.force_time:.6g} s"
-        yield f"largest reaction {found.force / size:.5g} {unit} {at}"
+        yield f"largest reaction among the samples {found.force / size:.5g} {unit} {at}"
