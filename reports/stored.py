@@ -90,10 +90,11 @@ def _of_known_scenes(
     found = read(path, shape)
     present = {record["key"] for record in of_scenes(list(found.values()), list(named.values()))}
     for key, record in found.items():
-        scene, motion = named.get(record["scene"]), record.get("motion") or record
+        scene, truth = named.get(record["scene"]), record.get("motion")
+        states = (truth or record).get("bodies")
         if scene is None:
             fault = f"scene: no file of scenes/ has the name {record['scene']!r}"
-        elif record["key"] in present and not _fits(motion.get("bodies"), scene):
+        elif record["key"] in present and (states or truth) and not _fits(states, scene):
             fault = "bodies: are not the bodies of the scene"
         else:
             continue
@@ -102,8 +103,8 @@ def _of_known_scenes(
 
 
 def _fits(states: dict[str, Any] | None, scene: Scene) -> bool:
-    """Return whether a motion has states of all bodies of a scene, or none."""
-    return not states or set(states) == {body.name for body in scene.body}
+    """Return whether a motion has states of all bodies of a scene."""
+    return set(states or ()) == {body.name for body in scene.body}
 
 
 def verified(folder: Path) -> list[Record]:

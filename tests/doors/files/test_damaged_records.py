@@ -82,9 +82,14 @@ def test_record_whose_parts_do_not_fit_is_named(field, value, said, tmp_path, ca
 
 
 LACKING = b'{"key": "k1", "scene": "four_bar"}\n'
+UNMOVED = (
+    b'{"key": "k1", "scene": "four_bar", "kind": "x", "bound": 0.0, "reason": "", "until": 0.1, '
+    b'"both": true, "motion": {"times": [], "bodies": {}}}\n'
+)
 
 
 BESIDE = {
+    "truth without bodies": ("truths.jsonl", UNMOVED, "record 'k1': bodies: are not the bodies of"),
     "no numbers in timings": ("timings.jsonl", LACKING, "record 'k1': seconds: field required"),
     "no truth": ("truths.jsonl", LACKING, "record 'k1': kind: field required"),
     "no motion": ("motions.jsonl", LACKING, "record 'k1': engine: field required"),

@@ -137,8 +137,11 @@ def test_several_motions_are_drawn_into_given_axes(motion):
 
 
 def test_two_quantities_for_given_axes_or_three_columns_as_abscissa_are_refused(motion):
-    """Axes have one unit; ``over`` takes one column, and a position has three."""
+    """Axes have one unit; ``over`` takes one column of all motions, and a position has three."""
     with pytest.raises(mbref.InputError, match="ax: takes columns of one quantity"):
         motion.plot("A.angle", "A.rate", ax=Figure().subplots())
     with pytest.raises(mbref.InputError, match="over: must be one column"):
         motion.plot("A.angle", over="mass.position")
+    free = mbref.simulate(crank().with_(joint=[], driver=[], gravity=[1, 0, 0]), times=TIMES[:2])
+    with pytest.raises(mbref.InputError, match=r"over: motion 'free' has no column 'A\.angle'"):
+        mbref.plot({"crank": motion, "free": free}, "mass.position.x", over="A.angle")
