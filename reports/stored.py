@@ -97,6 +97,8 @@ def _of_known_scenes(
         elif record["key"] in present and (states or truth) and not _fits(states, scene):
             fault = "bodies: are not the bodies of the scene"
         else:
+            if states and record["key"] in present:
+                (truth or record)["bodies"] = {body.name: states[body.name] for body in scene.body}
             continue
         raise RecordsError(f"{path}: record {key[:12]!r}: {fault}; restore it")
     return found

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Engine, Setting
+from crosscheck.judge.metrics import in_scene_order
 from crosscheck.refusals import shortened
 from mbref.motions.trajectory import Cost, Outcome, Trajectory
 from mbref.scene import Scene
@@ -29,7 +30,8 @@ class MalformedAnswer(Exception):
 
 
 def well_formed(answer: Any, scene: Scene, times: np.ndarray) -> Trajectory:
-    """Return the engine's result of ``run(scene, times, …)`` as a Trajectory of plain numbers.
+    """Return the engine's result of ``run(scene, times, …)`` as a Trajectory of plain numbers, with the
+    bodies in the scene's order.
 
     Raises MalformedAnswer if it is no Trajectory, has other bodies, other or too few samples, arrays of
     another shape or fields of another type, belongs to another scene, or has no version.
@@ -54,7 +56,7 @@ def well_formed(answer: Any, scene: Scene, times: np.ndarray) -> Trajectory:
     if np.any(np.abs(np.linalg.norm(plain["orientation"], axis=-1) - 1) > UNIT_TOLERANCE):
         raise MalformedAnswer("orientation: has a quaternion that is not of unit length")
     texts: dict[str, Any] = {name: str(getattr(answer, name)) for name in ("version", "method")}
-    return replace(
+    found = replace(
         answer,
         **plain,
         **texts,
@@ -66,6 +68,7 @@ def well_formed(answer: Any, scene: Scene, times: np.ndarray) -> Trajectory:
         t_end=_number("t_end", answer.t_end),
         reactions=_reactions(answer.reactions, scene, reached.size),
     )
+    return in_scene_order(scene, found)
 
 
 def answered(simulator: Engine, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:

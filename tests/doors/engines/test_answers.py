@@ -10,7 +10,7 @@ import pytest
 from crosscheck.engine import Setting
 from crosscheck.processes.answer import MalformedAnswer, well_formed
 from crosscheck.study.grid import Case, study
-from mbref.motions.trajectory import Cost, Outcome
+from mbref.motions.trajectory import PER_BODY, Cost, Outcome
 from mbref.scene import Body, Scene
 from tests.helpers.fake_engines import DAMAGES, FAKE, FAKES, MALFORMED, SCALARS
 
@@ -57,6 +57,15 @@ def test_only_a_failed_run_may_answer_with_the_first_samples_alone():
     assert well_formed(failed, SCENE, TIMES).times.tolist() == [0.0, 0.1]
     with pytest.raises(MalformedAnswer, match="completed with 2 of 3 samples"):
         well_formed(completed, SCENE, TIMES)
+
+
+def test_bodies_of_an_answer_are_put_into_the_scene_s_order():
+    """An engine may name its bodies in any order; tables and reports compare arrays in the scene's."""
+    scene = SCENE.with_(body=(BLOCK, BLOCK.model_copy(update={"name": "plate", "position": (0.0, 0.0, 9.0)})))
+    good = FAKE.run(scene, TIMES, Setting("a"))
+    turned = {name: getattr(good, name)[:, ::-1] for name in PER_BODY if getattr(good, name) is not None}
+    run = well_formed(replace(good, bodies=good.bodies[::-1], **turned), scene, TIMES)
+    assert run.bodies == ("block", "plate") and np.array_equal(run.position, good.position)
 
 
 def test_a_completed_run_of_zero_seconds_is_a_well_formed_answer():

@@ -13,6 +13,7 @@ from crosscheck.study.truths import truth_record
 from mbref.records import strict_json
 from mbref.scenes import SCENES
 from reports.__main__ import main as report
+from reports.stored import groups
 from tests.fuzz.broken_files import RECORD
 
 FOREIGN = [b"null\n", b"[" * 100_000 + b"\n", b"\xff\xfe\x00\n", b"[]\n", b'{"key": 1}\n', b"\x1b[31m\n"]
@@ -216,10 +217,15 @@ def test_records_of_another_mechanism_than_the_scene_file_are_named_and_not_left
 
 def test_report_shows_the_runs_at_the_times_of_the_latest_truth_alone(tmp_path):
     """A folder has runs of one mechanism to 0.1 s at 2 and at 3 samples, and to 0.2 s, with other errors. Its
-    scene ends at 0.1 s, and the latest truth is of 3 samples."""
+    scene ends at 0.1 s, and the latest truth is of 3 samples. Bodies of a record may be in any order."""
+    rows = {"position": 3, "orientation": 4, "velocity": 3, "angular_velocity": 3}
+    states = {name: [[1.0] + [0.0] * (width - 1)] * 2 for name, width in rows.items()}
+    bodies = dict.fromkeys(("rocker", "crank", "coupler"), states)
     asked = {"2.22e-05": {"samples": 2}, "3.33e-05": {"samples": 3}, "4.44e-05": {"samples": 3, "end": 0.2}}
     runs = [
-        RECORD | {"key": error, "asked": RECORD["asked"] | when, "metrics": {"error": float(error)}}
+        RECORD
+        | {"key": error, "asked": RECORD["asked"] | when, "metrics": {"error": float(error)}}
+        | {"bodies": bodies}
         for error, when in asked.items()
     ]
     place = folder(tmp_path / "r", "".join(json.dumps(run) + "\n" for run in runs).encode())
@@ -228,3 +234,4 @@ def test_report_shows_the_runs_at_the_times_of_the_latest_truth_alone(tmp_path):
     assert report(["--render", str(place), "--section", "records"]) == 0
     shown = (place / "index.html").read_text()
     assert [error for error in asked if error in shown] == ["3.33e-05"]
+    assert groups(place)[0].runs[0].trajectory.bodies == ("crank", "coupler", "rocker")
