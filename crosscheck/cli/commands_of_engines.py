@@ -131,8 +131,9 @@ def add_files(commands: Commands) -> None:
 def add_diagnose(commands: Commands) -> None:
     """Add the parser of `crosscheck diagnose`."""
     about = (
-        "show what engines cannot simulate of a mechanism, and which known defects they have there, each "
-        "tried on the mechanism by short runs; exit status 1 if a defect shows"
+        "show what engines cannot simulate of a mechanism, which known defects they have there, each tried "
+        "on the mechanism by short runs, and which of their solvers differ there; exit status 1 if a defect "
+        "or a difference shows"
     )
     example = "crosscheck diagnose robot.xml --engine mujoco"
     parser = add_command(commands, "diagnose", about, example)

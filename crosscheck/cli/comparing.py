@@ -48,7 +48,7 @@ def compare(arguments: argparse.Namespace) -> int:
     paths = {
         s.name: shlex.join([path, *words]) for s, path in zip(asked.scenes, arguments.scene, strict=True)
     }
-    compared = comparisons(found, paths, arguments.reference_time)
+    compared = comparisons(found, paths, asked.engines, arguments.reference_time)
     for comparison in compared:
         if comparison.difference:
             name = comparison.judged.scene.name

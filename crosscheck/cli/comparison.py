@@ -10,8 +10,10 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from crosscheck.alternatives.at_model import Disagreement, disagreements
 from crosscheck.cli import request, scene_request, tables
 from crosscheck.cli.planning import Choice, plan
+from crosscheck.engine import engine
 from crosscheck.findings.at_model import Defect, defects
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.start import started
@@ -51,12 +53,15 @@ class Comparison:
         One sentence on the first engine whose mechanism differs. None if all agree.
     defects : sequence of Defect
         Known defects of engines that show at this mechanism (`crosscheck.findings.at_model`).
+    disagreements : sequence of Disagreement
+        Ways of an engine to solve the same equations that differ here (`crosscheck.alternatives.at_model`).
     """
 
     judged: Judged
     path: str
     difference: str | None
     defects: Sequence[Defect] = ()
+    disagreements: Sequence[Disagreement] = ()
 
     @cached_property
     def verdict(self) -> Verdict:
@@ -101,7 +106,8 @@ class Comparison:
         Returns
         -------
         dict
-            Scene, records, verdict, truth, differences between the engines' mechanisms, and known defects.
+            Scene, records, verdict, truth, differences between the engines' mechanisms, known defects, and
+            ways of an engine that differ.
         """
         known = self.judged.truth
         truth = {**{name: known[name] for name in TRUTH}, "dead": known.get("dead")}
@@ -113,6 +119,7 @@ class Comparison:
             "difference": self.difference,
             "differences": dict(self.judged.differences),
             "defects": [one._asdict() for one in self.defects],
+            "disagreements": [one._asdict() for one in self.disagreements],
         }
 
     def save(self, path: str | Path) -> None:
@@ -133,7 +140,7 @@ class Comparison:
         write(path, json.dumps(self.document(), allow_nan=False) + "\n")
 
     def print(self, console: Console) -> None:
-        """Print the verdict, tables, a plot and known defects.
+        """Print the verdict, tables, a plot, known defects, and ways of an engine that differ.
 
         Parameters
         ----------
@@ -144,6 +151,8 @@ class Comparison:
         for one in self.defects:
             sentence = f"\nKnown defect: {one.sentence}; `crosscheck findings {one.finding}`"
             console.print(sentence, markup=False, soft_wrap=True)
+        for pair in self.disagreements:
+            console.print(f"\nSolvers differ: {pair.sentence}", markup=False, soft_wrap=True)
 
     def __str__(self) -> str:
         text = io.StringIO()
@@ -229,7 +238,7 @@ def compare(
         tell,
     )
     path = f"{given.name}.toml" if isinstance(scene, Scene) else str(scene)
-    return comparisons(found, {lasting.name: path}, reference_time)[0]
+    return comparisons(found, {lasting.name: path}, names, reference_time)[0]
 
 
 def _several(names: str | Sequence[str] | None) -> Sequence[str] | None:
@@ -237,10 +246,12 @@ def _several(names: str | Sequence[str] | None) -> Sequence[str] | None:
     return [names] if isinstance(names, str) else names
 
 
-def comparisons(found: Collection, paths: dict[str, str], reference_time: float) -> list[Comparison]:
+def comparisons(
+    found: Collection, paths: dict[str, str], names: Sequence[str], reference_time: float
+) -> list[Comparison]:
     """Return one Comparison for each scene of a collection of records.
 
-    ``paths`` are the names of the scenes in commands.
+    ``paths`` are the names of the scenes in commands, and ``names`` the engines.
     """
     compared = []
     for group in judged(found.scenes, found.truths, found.records):
@@ -250,8 +261,11 @@ def comparisons(found: Collection, paths: dict[str, str], reference_time: float)
             differences |= force_differences(scene, group.records)
         first = next(iter(differences.values()), None)
         blamed = differences if group.truth["kind"] else {}
-        known = defects(scene, list(group.engines()), partial(settings, scene=scene))
-        compared.append(Comparison(replace(group, differences=blamed), paths[scene.name], first, known))
+        engines = [name for name in names if engine(name).name in group.engines()]
+        shown = replace(group, differences=blamed)
+        known = defects(scene, engines, partial(settings, scene=scene))
+        ways = disagreements(scene, engines)
+        compared.append(Comparison(shown, paths[scene.name], first, known, ways))
     return compared
 
 

@@ -79,9 +79,12 @@ def alternatives_agree(bench: Bench) -> Finding | Outside:
     return max(found, key=lambda one: one.measured / one.allowed)
 
 
-def runs_of(runner: Runner, scene: Scene, given: Alternatives) -> dict[str, Trajectory]:
-    """Return the runs, from the start to the end of a short motion, of the ways that serve the scene."""
-    times = np.array([0.0, min(scene.duration, max(SHORTEST, SHARE * scene.duration))])
+def runs_of(runner: Runner, scene: Scene, given: Alternatives, share: float = SHARE) -> dict[str, Trajectory]:
+    """Return the runs, from the start to the end of a short motion, of the ways that serve the scene.
+
+    The motion takes ``share`` of the scene's duration, at least SHORTEST.
+    """
+    times = np.array([0.0, min(scene.duration, max(SHORTEST, share * scene.duration))])
     settings = {n: s for n, s in given.ways.items() if not runner.refuses(scene, s.family)}
     runs = runner.in_turn([(scene, setting) for setting in settings.values()], times)
     return dict(zip(settings, runs, strict=True))
@@ -119,14 +122,23 @@ def quantities_of(scene: Scene, run: Trajectory) -> dict[str, np.ndarray]:
 
 
 def _finding(scene: Scene, within: float, ways: Mapping[str, Way]) -> Finding:
+    worst, words = worst_of(scene, within, ways)
+    return Finding(worst.size, within, words)
+
+
+def worst_of(scene: Scene, within: float, ways: Mapping[str, Way]) -> tuple[Apart, str]:
+    """Return the largest difference of two ways, and words on it.
+
+    Above the limit ``within`` one of the two ways is the way that Gauss's principle supports, if it can tell.
+    """
     worst = max(differences(scene, ways, itertools.combinations(ways, 2)))
     if worst.size <= within:
-        return Finding(worst.size, within, f"{' and '.join(map(repr, worst.ways))} in {worst.quantity}")
+        return worst, f"{' and '.join(map(repr, worst.ways))} in {worst.quantity}"
     if off := off_from_gauss(scene, ways, worst.sample):
         right = min(off, key=lambda name: off[name])
         beside = max(differences(scene, ways, ((right, name) for name in ways if name != right)))
         worst = beside if beside.size > within else worst
-    return Finding(worst.size, within, _sentence(worst, off))
+    return worst, _sentence(worst, off)
 
 
 def _sentence(worst: Apart, off: Mapping[str, float]) -> str:

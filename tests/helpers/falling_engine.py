@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from crosscheck.engine import Engine, Setting, Trajectory
+from crosscheck.engine import Alternatives, Engine, Setting, Trajectory
 from mbref.scene import Body, Scene
 
 FACTOR, STEP = 1.0, 0.1
@@ -49,4 +49,14 @@ class Falling(Engine):
         return falling_engine.fall
 
 
-ENGINE = Falling()
+class SeveralWays(Falling):
+    """Two ways to fall, with one and with one and a half of the gravity."""
+
+    alternatives = (
+        Alternatives(
+            {name: Setting("plain", {"factor": f}) for name, f in (("light", 1), ("heavy", 1.5))}, 1e-6
+        ),
+    )
+
+
+ENGINE, SEVERAL = Falling(), SeveralWays()
