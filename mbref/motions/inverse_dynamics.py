@@ -27,9 +27,8 @@ from mbref.motions.driving_forces import driving_forces
 from mbref.motions.joint_motion import along, joint_motion, position_of, turned_since_start
 from mbref.motions.motion import Motion
 from mbref.motions.motor_motion import MotorMotion
-from mbref.motions.pieces import is_intermittent
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import Joint, Scene
+from mbref.scene import Joint, Scene, intermittent
 from mbref.scene.fields import meant
 from mbref.scene.joints import ANGLE
 from mbref.scene.validation import DRIVABLE
@@ -131,8 +130,8 @@ def check_motors(scene: Scene, motors: Sequence[str]) -> None:
         raise InputError("motors: needs at least one joint, and each joint once")
     if not scene.driver:
         raise InputError(f"{scene.name} has no driver whose motion motors could cause")
-    if is_intermittent(scene):
-        raise InputError(f"inverse dynamics needs constraints that always hold, and {scene.name} has others")
+    if path := next(intermittent(scene), ""):
+        raise InputError(f"{path}: inverse dynamics needs constraints that always hold")
 
 
 def _samples(

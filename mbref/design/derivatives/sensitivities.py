@@ -32,9 +32,8 @@ from mbref.input_error import InputError
 from mbref.method import SERIES_METHOD, Method, default_method
 from mbref.motions.motion import Motion
 from mbref.motions.outputs import UNIT_OF, quantity_of
-from mbref.motions.pieces import is_intermittent
 from mbref.motions.trajectory import Outcome
-from mbref.scene import Scene, refuse_rolling
+from mbref.scene import Scene, intermittent, refuse_rolling
 from mbref.scenes import find_scene
 from mbref.simulation.simulate import SAMPLES, checked_times
 from mbref.stepping.limits import FINEST, Limits
@@ -122,8 +121,8 @@ def motion_and_derivatives(
 
 def _refuse(scene: Scene, of: Sequence[str] | None, to: Sequence[str] | None) -> None:
     """Raise InputError for scenes without derivatives, and for an empty list of outputs or numbers."""
-    if is_intermittent(scene):
-        raise InputError(f"{scene.name}: intervals (`active`) and end stops have no derivatives here")
+    if path := next(intermittent(scene), ""):
+        raise InputError(f"{path}: motions with intervals, conditions and stops have no derivatives here")
     if of is not None:
         _refuse_no_list("of", of)
     if to is not None:
