@@ -14,6 +14,7 @@ from crosscheck.cli.options import add_depth, add_engines, add_folder, add_refer
 from crosscheck.cli.scene_request import RequestError, find_scenes
 from mbref.command_line import INTERRUPTED, Parser, output_file, status_of
 from mbref.files import write
+from mbref.scene import Scene, intermittent
 
 from .blocks import Block
 from .runs import Run, SceneRuns, by_scene
@@ -21,6 +22,7 @@ from .runs import Run, SceneRuns, by_scene
 # module → package to install
 NEEDS = {"matplotlib": "matplotlib", "jinja2": "jinja2", "resvg_py": "resvg-py"}
 PAPER, STABILITY, CLOSED_LOOPS = "paper", "stability", "closed_loops"
+OF_ONE_SET = ("verdict", "mechanism", "violation", "energy", "accelerations", "reactions")
 OWN = (STABILITY, CLOSED_LOOPS, PAPER)  # sections with runs of their own
 TITLES: dict[tuple[str, ...], str] = {  # titles of pages of one section
     (PAPER,): "Stabilisation methods for redundant constraints",
@@ -53,6 +55,7 @@ def _report(argv: Sequence[str] | None) -> int:
         )
     try:
         scenes = find_scenes(arguments.scene) if arguments.scene else None
+        _refuse_intermittent(scenes or (), names)
         wanted = collection.Runs(scenes, arguments.engine, is_quick, arguments.reference_time)
         collection.claim(out, arguments.force)
         _write(_blocks(out, wanted, names), out, names)
@@ -60,6 +63,16 @@ def _report(argv: Sequence[str] | None) -> int:
         _notice(f"interrupted; the finished runs are in {arguments.out}, the same command resumes from there")
         return INTERRUPTED
     return 0
+
+
+def _refuse_intermittent(scenes: Sequence[Scene], names: Sequence[str]) -> None:
+    """Raise RequestError if a section needs one set of constraints and a scene has several."""
+    several = [path for scene in scenes for path in intermittent(scene)]
+    if several and (needing := [name for name in names if name in OF_ONE_SET]):
+        raise RequestError(
+            f"{several[0]}: no report's section {' or '.join(needing)} has joints that come and go, or end "
+            "stops; choose others by --section, or use crosscheck compare"
+        )
 
 
 def _picture(path: Path) -> int:
