@@ -57,7 +57,10 @@ def looked_at(path: str | Path | None) -> dict[str, dict[str, Any]]:
 
 
 def _content(path: str | Path | None) -> bytes:
-    return Path(path).read_bytes() if path is not None and Path(path).exists() else b""
+    """Return the bytes of a file; a device such as /dev/full, which may have no end, is not read."""
+    if path is None or not Path(path).exists() or Path(path).is_char_device():
+        return b""
+    return Path(path).read_bytes()
 
 
 def _decompressed(path: str | Path | None, text: bytes) -> bytes:

@@ -105,3 +105,10 @@ def test_write_that_fails_half_way_raises_an_error_and_leaves_whole_lines(tmp_pa
     process.join()
     assert process.exitcode == 7, "the write was to fail"
     assert path.read_text() == '{"key": "a"}\n'
+
+
+def test_device_without_an_end_holds_no_records_and_refuses_new_ones():
+    """/dev/full gives zeros for ever, and is full for each byte that is written to it."""
+    assert records.opened("/dev/full") == {}
+    with pytest.raises(OSError, match="No space left"):
+        append("/dev/full", {"key": "a"})
