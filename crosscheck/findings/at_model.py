@@ -1,13 +1,14 @@
 """Findings at a model of the user's own: known defects of engines that meet the model are tried on it.
 
 A finding with conditions names settings that have the defect, and a remedy. A short run with the remedy and
-one without it decide whether the defect is there.
+one without it decide whether the defect is there, by Gauss's principle or by a quantity that the motion
+keeps.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,9 +17,11 @@ from crosscheck.engine import Setting, engine
 from crosscheck.engines.shared.spanning_tree import spanning_tree
 from crosscheck.findings.finding import SAMPLES, Finding, When, findings
 from crosscheck.judge.deadline import TimeIsUp, within
+from crosscheck.judge.energy import energy_gain
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.metrics import error_series, in_scene_order
 from crosscheck.judge.model_identity import gate_times
+from crosscheck.judge.momentum import momentum_drifts
 from crosscheck.judge.start_accelerations import Starts, starts
 from crosscheck.processes.pool import run_isolated
 from crosscheck.study.words.speed import TITLES
@@ -33,12 +36,12 @@ Offers = Callable[[str], Sequence[Setting]]  # an engine's settings for the scen
 
 class Defect(NamedTuple):
     """A known defect that shows at a model: finding, engine, family of settings, relative difference that the
-    remedy makes, and a sentence for the user."""
+    remedy makes (None: infinite), and a sentence for the user."""
 
     finding: str
     engine: str
     family: str
-    apart: float
+    apart: float | None
     sentence: str
 
 
@@ -70,20 +73,24 @@ def _meets(scene: Scene, one: Finding, when: When) -> bool:
 
 
 def _tried(scene: Scene, one: Finding, when: When, settings: Sequence[Setting]) -> Defect | None:
-    """Return the defect at the setting where the remedy makes the largest difference, if it makes one."""
-    pairs = (_pair(scene, one, when, setting) for setting in _ends(when, settings))
-    found = max((pair for pair in pairs if pair), key=lambda pair: pair.apart, default=None)
+    """Return the defect at the setting where the remedy makes the largest finite difference."""
+    tried = (_pair(scene, one, when, setting) for setting in _ends(when, settings))
+    pairs = [pair for pair in tried if pair]
+    finite = [pair for pair in pairs if math.isfinite(pair.apart)]
+    found = max(finite or pairs, key=lambda pair: pair.apart, default=None)
     if found is None:
         return None
     name, version = TITLES.get(one.engine, one.engine), engine(one.engine).version()
     sentence = f"{name} {version} {when.says} and is wrong there: {when.advice}"
-    return Defect(one.name, one.engine, found.setting.family, found.apart, f"{sentence} ({found.words})")
+    apart = found.apart if finite else None
+    return Defect(one.name, one.engine, found.setting.family, apart, f"{sentence} ({found.words})")
 
 
 def _ends(when: When, settings: Sequence[Setting]) -> Iterator[Setting]:
     """Yield the coarsest and the finest setting of each family that a finding is about."""
+    asked = when.settings.items()
     for family in when.families:
-        found = [setting for setting in settings if setting.family == family]
+        found = [s for s in settings if s.family == family and asked <= s.options.items()]
         yield from found[:1]
         yield from found[1:][-1:]
 
@@ -93,6 +100,8 @@ def _pair(scene: Scene, one: Finding, when: When, setting: Setting) -> Tried | N
     mended = Setting(when.family or setting.family, {**setting.options, **when.options})
     times = np.linspace(0.0, when.seconds, SAMPLES) if when.seconds else gate_times(scene)
     runs = [run_isolated(one.engine, scene, times, s, RUN_SECONDS) for s in (setting, mended)]
+    if when.keeps:
+        return _drifting(scene, when, setting, *runs)
     if any(run.outcome is not Outcome.COMPLETED for run in runs):
         return None
     first, second = (in_scene_order(scene, run) for run in runs)
@@ -101,6 +110,50 @@ def _pair(scene: Scene, one: Finding, when: When, setting: Setting) -> Tried | N
     what = ("accelerations at the start", "of the largest") if found else ("poses", "rad or lengths")
     words = f"{what[0]} are off by {wrong:.2g} {what[1]}, otherwise by {right:.2g}"
     return Tried(setting, apart, words) if apart > when.above and right <= BETTER * wrong else None
+
+
+def _drifting(
+    scene: Scene, when: When, setting: Setting, first: Trajectory, second: Trajectory
+) -> Tried | None:
+    """Return the drift of the quantity that the motion keeps, without and with the remedy.
+
+    The drift is infinite if the run becomes infinite. None if the motion does not keep the quantity, or the
+    remedy does not halve its drift.
+    """
+    wrong, right = (_drift(scene, when, run) for run in (first, second))
+    if wrong is None or right is None or not math.isfinite(right):
+        return None
+    off = f"off by {wrong:.2g} of its size after {when.seconds:g} s" if math.isfinite(wrong) else "infinite"
+    words = f"the {when.keeps} is {off}, otherwise off by {right:.2g}"
+    return Tried(setting, wrong, words) if wrong > when.above and right <= BETTER * wrong else None
+
+
+def _drift(scene: Scene, when: When, run: Trajectory) -> float | None:
+    """Return the drift of the quantity that a run should keep; None if that is not known."""
+    if run.outcome is Outcome.NOT_FINITE:
+        return math.inf
+    if run.outcome is not Outcome.COMPLETED:
+        return None
+    return KEPT[when.keeps](scene, in_scene_order(scene, run))
+
+
+def _turned(scene: Scene, run: Trajectory) -> float | None:
+    """Return the largest drift of the angular momentum, relative to its size; None if it is not kept."""
+    drifts = momentum_drifts(scene, run)
+    return None if drifts is None else float(drifts[1].max())
+
+
+def _fed(scene: Scene, run: Trajectory) -> float | None:
+    """Return the largest gain of energy, relative to the energy; None if it is not kept."""
+    gain = energy_gain(scene, run)
+    return None if gain is None else max(0.0, float(gain.max()))
+
+
+# quantities that a motion keeps, by name: the drift in a run
+KEPT: Mapping[str, Callable[[Scene, Trajectory], float | None]] = {
+    "angular momentum": _turned,
+    "energy": _fed,
+}
 
 
 def _poses(scene: Scene, first: Trajectory, second: Trajectory) -> Starts:

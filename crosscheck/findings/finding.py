@@ -65,8 +65,9 @@ class When:
     independent ``loops``, and one of the types of ``joints`` (empty: any). The remedy is another ``family``
     (empty: the same one) and ``options``. The model has the finding if the remedy changes accelerations at
     the start by more than ``above``, relative to the largest, and halves their error. Poses over ``seconds``
-    count if the engine gives no accelerations. ``says`` is the predicate of the sentence for the user, and
-    ``advice`` the remedy.
+    count if the engine gives no accelerations. ``settings`` are options that a setting must have.
+    If the run ``keeps`` a quantity of KEPT in truth, its drift over ``seconds`` counts instead. ``says`` is
+    the predicate of the sentence for the user, and ``advice`` the remedy.
     """
 
     says: str
@@ -79,6 +80,8 @@ class When:
     family: str = ""
     options: Mapping[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    keeps: str = ""
 
 
 @dataclass(frozen=True)
