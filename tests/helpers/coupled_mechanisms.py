@@ -69,10 +69,8 @@ def slide_with_motor() -> Scene:
 
 def planetary() -> Scene:
     """Return a planet on an arm, both with armatures; the gears share the arm."""
-    arm, planet = (
-        body("arm", 1.0, [0.1] * 3, (0.5, 0.0, 0.0)),
-        body("planet", 0.7, [0.1] * 3, (1.1, 0.0, 0.0)),
-    )
+    arm = body("arm", 1.0, [0.1] * 3, (0.5, 0.0, 0.0))
+    planet = body("planet", 0.7, [0.1] * 3, (1.1, 0.0, 0.0))
     hinges = hinge("A", "ground", "arm", ORIGIN, armature=0.05), hinge("B", "arm", "planet", X, armature=0.02)
     parts = {"body": [arm, planet], "joint": hinges, "coupling": [coupling("mesh", "A", "B", 3.0)]}
     return Scene(name="planetary", gravity=(0.0, -G, 0.0), duration=1.0, **parts)

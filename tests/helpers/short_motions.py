@@ -157,10 +157,8 @@ for _name, _driver in DRIVERS.items():
 def driven_slide() -> Scene:
     """Return a cart that is driven along a slope, with a pendulum on it."""
     bodies = [block("cart", (0.0, 0.0, 0.0)), block("bob", (0.3, -0.4, 0.1), 0.6)]
-    joints = [
-        slide("A", "ground", "cart", (0.0, 0.0, 0.0), (0.8, 0.6, 0.0)),
-        hinge("B", "cart", "bob", (0.1, 0.0, 0.0)),
-    ]
+    guide = slide("A", "ground", "cart", (0.0, 0.0, 0.0), (0.8, 0.6, 0.0))
+    joints = [guide, hinge("B", "cart", "bob", (0.1, 0.0, 0.0))]
     driver = [{"joint": "A", "polynomial": [0.0, 0.0, 1.5], "sine": {"amplitude": 0.05, "frequency": 12.0}}]
     return made("driven slide", bodies, joints, driver=driver)
 
@@ -176,10 +174,8 @@ def driven_between_bodies() -> Scene:
         joint("D", "free", "a", "b", (0.9, 0.5, 0.3), axis=[1.0, 2.0, 2.0]),
     ]
     rows = [[0.0, 0.0], [0.1, 0.05], [0.2, -0.02], [0.3, -0.1], [0.4, 0.0]]
-    along = [
-        load("slide_spring", joint="D", stiffness=40.0, damping=2.0),
-        load("joint_force", joint="D", force=3.0),
-    ]
+    damped = load("slide_spring", joint="D", stiffness=40.0, damping=2.0)
+    along = [damped, load("joint_force", joint="D", force=3.0)]
     return made("driven between bodies", bodies, joints, driver=[{"joint": "D", "table": rows}], load=along)
 
 
@@ -299,10 +295,8 @@ def massless_link_between_slides() -> Scene:
         {"name": "bridge", "mass": 0.0, "inertia": [0.0] * 3, "position": [0.0, 0.0, 0.0]},
         block("tool", (0.1, 0.2, 0.0)),
     ]
-    joints = [
-        slide("A", "ground", "bridge", (0.0, 0.0, 0.0), X),
-        slide("B", "bridge", "tool", (0.0, 0.1, 0.0), Y),
-    ]
+    second = slide("B", "bridge", "tool", (0.0, 0.1, 0.0), Y)
+    joints = [slide("A", "ground", "bridge", (0.0, 0.0, 0.0), X), second]
     spring = {"type": "spring", "bodies": ["ground", "tool"], "points": [[-0.3, 0.4, 0.0], [0.1, 0.2, 0.0]]}
     return made("gantry", bodies, joints, load=[{**spring, "stiffness": 60.0, "natural_length": 0.2}])
 
@@ -350,11 +344,8 @@ MOTIONS |= {
 def two_loops_on_one_crank() -> Scene:
     """Return a crank that moves two rockers: six links, two loops, all hinges parallel."""
     bar = closed_chain("two loops", [CRANK, KNEE, TOP, PIVOT])
-    bodies = [
-        *bar.model_dump()["body"],
-        rod("c", KNEE, (-0.5, 0.5, 0.0)),
-        rod("d", (-0.5, 0.5, 0.0), (-0.6, 0.0, 0.0)),
-    ]
+    rods = rod("c", KNEE, (-0.5, 0.5, 0.0)), rod("d", (-0.5, 0.5, 0.0), (-0.6, 0.0, 0.0))
+    bodies = [*bar.model_dump()["body"], *rods]
     joints = [
         *bar.model_dump()["joint"],
         hinge("K", "link 1", "c", KNEE),

@@ -91,12 +91,8 @@ def _imports(path: Path) -> tuple[ast.Import | ast.ImportFrom, ...]:
     """Return the imports of a file, in an ``__init__`` without those under TYPE_CHECKING."""
     body = parsed(path).body
     if path.name == "__init__.py":
-        body = [node for node in body if not _is_for_types(node)]
+        body = [n for n in body if not (isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING")]
     return tuple(node for node in _nested(body) if isinstance(node, ast.Import | ast.ImportFrom))
-
-
-def _is_for_types(node: ast.stmt) -> bool:
-    return isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
 
 
 def children(arrows: Graph, folder: str) -> dict[str, set[str]]:

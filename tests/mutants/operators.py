@@ -76,7 +76,8 @@ def mutants(file: str, source: str) -> list[Mutant]:
 
     found = []
     for node in _nodes(ast.parse(source)):
-        for kind, part, new in _changes(node):
+        makers = (_operations, _comparisons, _numbers, _calls, _statements, _conditions)
+        for kind, part, new in [change for made in makers for change in made(node)]:
             start, end = place(part)
             old = source.encode()[start:end].decode()
             found.append(Mutant(file, part.lineno, kind, old, new, start, end))  # type: ignore[attr-defined]
@@ -88,7 +89,8 @@ def places(root: Path, packages: Sequence[str], mutant: Mutant) -> dict[str, int
     line; for a function's head, its body; for a name's value outside functions, the lines with that name."""
     source = (root / mutant.file).read_text()
     tree = ast.parse(source)
-    around = [node for node in ast.walk(tree) if isinstance(node, ast.stmt) and _is_at(node, mutant.line)]
+    nodes = [node for node in ast.walk(tree) if isinstance(node, ast.stmt)]
+    around = [node for node in nodes if node.lineno <= mutant.line <= (node.end_lineno or 0)]
     innermost = max(around, key=lambda node: node.lineno)
     if isinstance(innermost, ast.FunctionDef):
         return {mutant.file: _bits(innermost.body[0].lineno, innermost.body[-1].end_lineno)}
@@ -109,10 +111,6 @@ def places(root: Path, packages: Sequence[str], mutant: Mutant) -> dict[str, int
         found[name] = sum(1 << k for k in at)
     found[mutant.file] &= ~_bits(innermost.lineno, innermost.end_lineno)
     return found
-
-
-def _is_at(node: ast.stmt, line: int) -> bool:
-    return node.lineno <= line <= (node.end_lineno or 0)
 
 
 def _bits(first: int, last: int | None) -> int:
@@ -136,12 +134,6 @@ def _is_left(node: ast.AST) -> bool:
     if isinstance(node, ast.keyword):
         return node.arg == "strict"  # of zip: a check of lengths that are equal
     return isinstance(node, ast.JoinedStr)
-
-
-def _changes(node: ast.AST) -> Iterator[tuple[str, ast.AST, str]]:
-    """Yield kind, the part of the node that is replaced, and its new text."""
-    for kind in (_operations, _comparisons, _numbers, _calls, _statements, _conditions):
-        yield from kind(node)
 
 
 Changes = Iterator[tuple[str, ast.AST, str]]

@@ -109,9 +109,8 @@ def truths() -> tuple[dict[str, Any], ...]:
 def motion() -> dict[str, Any]:
     """The true motion of the first scene at the instants shown, moved, as the wrong run's."""
     shown = truths()[0]["motion"]
-    bodies = {
-        n: {**b, "position": (np.array(b["position"]) + 0.1).tolist()} for n, b in shown["bodies"].items()
-    }
+    moved = {name: (np.array(body["position"]) + 0.1).tolist() for name, body in shown["bodies"].items()}
+    bodies = {name: {**body, "position": moved[name]} for name, body in shown["bodies"].items()}
     return {**shown, "scene": scene().name, "engine": "mujoco", "family": "defaults", "bodies": bodies}
 
 

@@ -132,9 +132,8 @@ def test_branch_that_ended_early_says_so_and_stands_still(parted):
     bodies = {n: {k: v[:count] for k, v in body.items()} for n, body in second["bodies"].items()}
     times = second["times"][:count]
     early = {**second, "outcome": "STEP_FAILED", "t_end": times[-1], "times": times, "bodies": bodies}
-    (block,) = [
-        b for b in crossings.render(replace(parted, branches=[first, early])) if isinstance(b, Moving)
-    ]
+    blocks = crossings.render(replace(parted, branches=[first, early]))
+    (block,) = [each for each in blocks if isinstance(each, Moving)]
     assert block.panels[1][0] == f"Branch 2; ended at t = {early['t_end']:.4g} s: STEP_FAILED"
     _, coupler, _ = bars(block.panels[1][1])
     assert len(coupler) == len(first["times"]) > count + 1

@@ -47,10 +47,8 @@ def test_best_cells_show_error_refusal_and_early_end(section):
 def test_default_rows_are_the_engines_with_a_run_of_defaults(section):
     """mbref has no defaults, Pinocchio a refusal and a tuned run. A wrong run has the style "false"."""
     _, defaults = maps(section)
-    assert {name: row[0].text for name, row in defaults.rows.items()} == {
-        "mujoco": "✗ 0.5",
-        "exudyn": "! ended",
-    }
+    shown = {name: row[0].text for name, row in defaults.rows.items()}
+    assert shown == {"mujoco": "✗ 0.5", "exudyn": "! ended"}
     assert defaults.rows["mujoco"][0].kind == "false"
 
 

@@ -25,9 +25,8 @@ def test_sections_of_the_committed_report_follow_from_the_stored_records(groups)
     names = [name for name in sections.NAMES if name != "reactions"]
     blocks = sections.blocks(groups, names, stored.verified(FOLDER))
     missing = [b for b in blocks if render.markdown([b]).split("\n\n", 1)[1].strip() not in text]
-    assert not missing and len(blocks) > 100, (
-        f"crosscheck report --render reports/reference renews it: {missing}"
-    )
+    says = f"crosscheck report --render reports/reference renews it: {missing}"
+    assert not missing and len(blocks) > 100, says
 
 
 @pytest.mark.slow

@@ -100,10 +100,8 @@ def test_published_problem_accepts_a_run_by_its_own_measure():
 
 def test_best_run_may_end_within_rounding_of_the_end_of_the_motion():
     """The better run, off by 1e-5, ends 1e-10 s before 0.02 s, and counts as completed."""
-    ends = [
-        record("a", "x", 1e-3, 0.1, step=1.0),
-        {**record("a", "x", 1e-5, 0.1, step=0.1), "t_end": 0.0199999999},
-    ]
+    better = {**record("a", "x", 1e-5, 0.1, step=0.1), "t_end": 0.0199999999}
+    ends = [record("a", "x", 1e-3, 0.1, step=1.0), better]
     [group] = by_scene(ends, {scene().name: scene()})
     assert group.best()["a", "x"].error == pytest.approx(1e-5), group.best()
 
@@ -118,8 +116,7 @@ def test_convergence_table_shows_the_orders_put_into_the_records():
 
 
 def test_limit_table_shows_the_bias_and_discretisation_put_in():
-    """At the step h, a is off by 1e-4 + 1e-2 h: 1e-5 is discretisation at 1e-3; b by 1e-2 h², with no
-    bias."""
+    """At the step h, a is off by 1e-4 + 1e-2 h: 1e-5 is discretisation at 1e-3; b by 1e-2 h², no bias."""
     soft = [record("a", "soft", 1e-4 + 1e-2 * h, 0.1, step=h) for h in (0.04, 0.02, 0.001)]
     true = [record("b", "true", 1e-2 * h**2, 0.1, step=h) for h in (0.04, 0.02, 0.01)]
     [group] = by_scene([*soft, *true], {scene().name: scene()})
@@ -217,9 +214,8 @@ def test_mechanism_table_has_the_scene_s_rows_and_rank():
     cells = dict(zip(found.header, found.rows[0], strict=True))
     counts = mbref.counts(scene())
     assert cells["Rank"] == str(counts.rank) and cells["Rows"] == str(counts.rows), (cells, counts)
-    assert (
-        sum(int(v) for k, v in cells.items() if k[:2] in {f"{j.name} " for j in scene().joint}) == counts.rows
-    )
+    heads = {f"{joint.name} " for joint in scene().joint}
+    assert sum(int(v) for k, v in cells.items() if k[:2] in heads) == counts.rows
 
 
 def test_provenance_lists_versions_machine_settings_and_seed():

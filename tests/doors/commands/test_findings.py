@@ -89,7 +89,6 @@ def test_the_proof_of_a_finding_gives_its_stored_number_at_the_stored_version(na
 
 def test_the_command_rechecks_a_finding_and_prints_its_status(capsys) -> None:
     """MuJoCo reads the small files of the corpus now as the stored records of its finding say."""
-    pytest.importorskip("mujoco")
     assert main(["findings", "files-mujoco", "--recheck"]) == 0
     assert re.search(r"mujoco.*present.*changed: none", " ".join(capsys.readouterr().out.split()))
 

@@ -43,9 +43,7 @@ def ten_seconds() -> Iterator[None]:
 @pytest.mark.usefixtures("ten_seconds")
 @pytest.mark.parametrize(("program", "words"), COMMANDS, ids=lambda x: x[0] if isinstance(x, list) else "")
 @pytest.mark.parametrize("chain", ["four_bar_chain", "slider_crank_chain"])
-def test_chain_of_too_many_loops_is_refused_and_not_written(
-    program, words, chain, tmp_path, monkeypatch, capsys
-):
+def test_chain_of_too_many_loops_is_refused_unwritten(program, words, chain, tmp_path, monkeypatch, capsys):
     """The number of loops has 20 digits; a scene with so many would fill every memory."""
     monkeypatch.chdir(tmp_path)
     assert program([*words, f"{chain}[{HUGE}]"]) == 2

@@ -21,9 +21,7 @@ TEXTS: dict[str, Any] = dict.fromkeys(("name", "engine", "version", "does", "rig
     ],
     ids=["above the limit", "below it", "not a number", "no number", "error", "exit status"],
 )
-def test_status_of_a_finding_follows_from_the_last_number_of_its_proof(
-    script: str, status: Status, says: str
-):
+def test_status_of_a_finding_follows_from_the_last_number_of_its_proof(script: str, status: Status, says):
     """The limit is 1. The error is present if the last printed number is larger or NaN, otherwise gone, and
     unclear, with the reason, if there is none."""
     answer = Finding(**TEXTS, package="numpy", script=script, wrong_above=1.0).recheck()

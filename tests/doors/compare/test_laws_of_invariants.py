@@ -26,8 +26,8 @@ def test_power_of_a_law_is_found_whatever_its_sign(power: float) -> None:
 
 
 def test_cell_names_rounding_failures_and_refusals() -> None:
-    """Two values give no power, and values below 1e-12 are rounding. Signs: ! no run completes, – refused, ○
-    no record."""
+    """Two values give no power; values below 1e-12 are rounding. Signs: ! no run completes, – refused, ○ no
+    record."""
     assert cell([run(0.1, 3e-3), run(0.01, 2e-3)], STEPS) == "2e-03"
     assert cell([run(0.1, 1e-9), run(0.01, 1e-14), run(0.001, None, "TIMED_OUT")], STEPS) == "<1e-12"
     assert cell([run(0.1, None, "NOT_FINITE")], STEPS) == "!"

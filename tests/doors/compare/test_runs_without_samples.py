@@ -56,9 +56,7 @@ def printed(capsys: pytest.CaptureFixture[str], folder: Path, name: str, *option
 
 
 @pytest.mark.parametrize(("command", "outcomes"), [("run", [("CRASHED", [])]), ("tune", [])])
-def test_json_of_run_has_the_crash_of_an_engine_and_json_of_tune_no_setting(
-    command, outcomes, tmp_path, capsys
-):
+def test_json_of_run_has_the_crash_of_an_engine_and_of_tune_no_setting(command, outcomes, tmp_path, capsys):
     """The engine raises an error before the first sample of each run, so that tuning finds no setting."""
     records = json.loads(printed(capsys, tmp_path, command, "--json"))["records"]
     assert [(record["outcome"], record["times"]) for record in records] == outcomes

@@ -19,6 +19,7 @@ from tests.doors.derivatives.test_sensitivities import (
 from tests.helpers.coupled_mechanisms import body
 from tests.helpers.parts import hinge, slide
 from tests.helpers.powered_mechanisms import powered_mechanism
+from tests.helpers.statics import parallelogram
 
 BOUND = 1e-14  # relative error that the judge's bounds allow against closed forms
 HALF, INERTIA, ROD, ALONG, UP = 0.5, 0.07, 1.3, 0.8, 0.6  # m, kg m², kg: of the trammel
@@ -138,18 +139,9 @@ def test_derivatives_of_a_random_mechanism_equal_the_judges(seed):
         assert np.mean(np.abs(getattr(found, part) - judged) <= 10 * getattr(found.errors, part)) >= 0.99
 
 
-def flat_parallelogram() -> Scene:
-    """Return a parallelogram of links of 1 and 2 m in its flat pose, which two branches have."""
-    pins = [("A", "ground", "crank", 0.0), ("B", "crank", "coupler", 1.0), ("C", "coupler", "rocker", 3.0)]
-    joints = [hinge(n, a, b, (x, 0.0, 0.0)) for n, a, b, x in (*pins, ("D", "ground", "rocker", 2.0))]
-    places = (("crank", 0.5), ("coupler", 2.0), ("rocker", 2.5))
-    bodies = [body(name, 1.0, [0.01, 0.1, 0.1], (x, 0.0, 0.0)) for name, x in places]
-    return Scene(name="flat", duration=1.0, body=bodies, joint=joints)
-
-
 def test_derivatives_are_refused_at_a_singular_position_off_the_constraints_and_by_a_start_angle():
     """Two branches meet in the flat pose; q + 0.01 opens the loop; angle(0) is of the start of a motion."""
-    flat = flat_parallelogram()
+    flat = parallelogram(sine=0.0, cosine=1.0)
     with pytest.raises(mbref.InputError, match="singular position"):
         mbref.state_derivatives(flat)
     with pytest.raises(NotSmooth, match="singular position"):

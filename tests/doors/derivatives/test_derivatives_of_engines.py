@@ -142,8 +142,8 @@ def test_command_shows_the_committed_results_or_those_of_another_file(tmp_path, 
 @pytest.mark.slow
 @pytest.mark.skipif(not installed("pinocchio"), reason="needs Pinocchio")
 def test_pinocchio_is_right_about_a_link_of_constant_length_that_its_adapter_makes_a_rod(loop, capsys):
-    """The rod has inertia about its axis, but no spin. Errors are by position, velocity, force; in motion, at
-    rest."""
+    """The rod has inertia about its axis, but no spin. Six errors are by position, velocity and force, each
+    in motion and at rest."""
     main(["derivatives", "pinocchio", loop, "--json"])
     found = json.loads(capsys.readouterr().out)["rows"]
     judged = [row for row in found if row["truth"] == "judge" and row["function"] == "LOCAL"]

@@ -173,7 +173,6 @@ def error_of(scene: Scene, run: Trajectory) -> float:
 )
 def test_mujocos_compiled_family_gives_the_true_motion(name: str, beta: float, measured: float) -> None:
     """MuJoCo's accelerations, integrated at 1e-10; errors are at most ten times the measured ones."""
-    pytest.importorskip("mujoco")
     scene = SCENES[name]()
     run = simulate("mujoco", scene, 6, FAMILY, rtol=1e-10, min_step=1e-12, beta=beta, hard=1e-9)
     assert error_of(scene, run) < MARGIN * measured
@@ -183,7 +182,6 @@ def test_mujocos_compiled_family_gives_the_true_motion(name: str, beta: float, m
 def test_mujocos_compiled_families_move_and_react_by_gauss_s_principle(family: str, beta: float) -> None:
     """A scene of seven types of joints, with springs, a force and a moment, and a body that flies freely. Off
     by at most ten times GAUSS; the projected family keeps joints closed to 1e-12 of the length."""
-    pytest.importorskip("mujoco")
     twist = {"velocity": (0.3, -0.2, 1.0), "angular_velocity": (3.0, 1.0, -2.0)}
     flying = body("flying", (2.0, 1.0, 1.5), (0.1, 0.2, 0.3), **twist)
     scene = every_joint().with_(body=(*every_joint().body, flying), duration=0.2)
@@ -196,7 +194,6 @@ def test_mujocos_compiled_families_move_and_react_by_gauss_s_principle(family: s
 def test_mujocos_compiled_family_follows_a_driver_of_a_polynomial_and_a_sine() -> None:
     """The crank turns by 3 t - 20 t² + 0.4 sin(30 t) rad, from which the judge's truth follows. A wrong
     second derivative opens the closures. Errors are at most ten times the measured ones."""
-    pytest.importorskip("mujoco")
     driver = Driver(joint="A", polynomial=(0.0, 3.0, -20.0), sine=Sine(amplitude=0.4, frequency=30.0))
     scene = SCENES["spatial_slider_crank"]().with_(driver=(driver,), load=(), duration=0.2)
     run = simulate("mujoco", scene, 11, FAMILY, rtol=1e-10, min_step=1e-9, beta=50.0, hard=1e-9)
@@ -207,7 +204,6 @@ def test_mujocos_compiled_family_follows_a_driver_of_a_polynomial_and_a_sine() -
 def test_a_failed_run_of_mujocos_compiled_family_has_the_samples_before_its_end() -> None:
     """With steps of at least 1 ms a slider-crank with equal links fails at its singular position, at one of
     three tolerances or more. Failed runs have finite samples, fewer than asked, and end within the motion."""
-    pytest.importorskip("mujoco")
     scene = SCENES["planar_slider_crank_equal"]()
     given = {"min_step": 1e-3, "beta": 30.0, "hard": 1e-9}
     runs = [simulate("mujoco", scene, 21, FAMILY, rtol=rtol, **given) for rtol in (1e-4, 1e-6, 1e-9)]
@@ -228,11 +224,8 @@ def test_a_failed_run_of_mujocos_compiled_family_has_the_samples_before_its_end(
         ("h_frame", 1e-10, 1e-9, 1.3e-11),
     ],
 )
-def test_mujocos_projected_compiled_family_gives_the_true_motion_through_singular_positions(
-    name, rtol, shortest, measured
-):
+def test_mujocos_projected_compiled_family_passes_singular_positions(name, rtol, shortest, measured):
     """Errors are at most ten times the measured ones; projection closes joints to 1e-12 of the length."""
-    pytest.importorskip("mujoco")
     scene = SCENES[name]()
     run = simulate("mujoco", scene, 11, PROJECTED, rtol=rtol, min_step=shortest, beta=0.0, hard=1e-9)
     assert error_of(scene, run) < MARGIN * measured
@@ -250,7 +243,6 @@ def test_mujocos_projected_compiled_family_gives_the_true_motion_through_singula
 def test_newton_on_mujocos_closures_gives_the_true_driven_motion(name, tolerance, measured) -> None:
     """The error of poses from the judge's truth is at most ten times the measured one. Velocities and
     accelerations have a relative error of 1e-11 measured; 1e-9 is allowed."""
-    pytest.importorskip("mujoco")
     scene = SCENES[name]()
     run = simulate("mujoco", scene, 11, NEWTON, tolerance=tolerance, turn=0.6)
     assert error_of(scene, run) < MARGIN * measured
@@ -263,8 +255,12 @@ def test_newton_on_mujocos_closures_gives_the_true_driven_motion(name, tolerance
 def test_newton_ends_where_closures_cannot_be_met() -> None:
     """Coupler and rocker are too short for a whole turn of the driven crank. The run ends before 2 s with the
     samples so far, and its message names the closures."""
-    pytest.importorskip("mujoco")
-    scene = out_of_reach()
+    pins = ((0.0, 0.0, 0.0), (0.0, 0.3, 0.0), (0.2, 0.3, 0.0), (0.4, 0.0, 0.0))
+    names = ("ground", "crank", "coupler", "rocker", "ground")
+    bodies = [rod(names[k + 1], pins[k], pins[k + 1]) for k in range(3)]
+    joints = [hinge("ABCD"[k], names[k], names[k + 1], pins[k]) for k in range(4)]
+    driver = Driver(joint="A", polynomial=(0.0, 3.0))
+    scene = Scene(name="short", body=bodies, joint=joints, driver=(driver,), duration=2.0)
     run = simulate("mujoco", scene, 5, NEWTON, tolerance=1e-10, turn=0.1)
     assert run.outcome is Outcome.NOT_CONVERGED and "closures" in run.message
     assert 0 < len(run.times) < 5 and 0 < run.t_end < scene.duration
@@ -272,19 +268,8 @@ def test_newton_ends_where_closures_cannot_be_met() -> None:
 
 def test_newton_refuses_a_scene_whose_motion_is_not_prescribed() -> None:
     """The family NEWTON solves joints and drivers, and needs a driver for each freedom."""
-    pytest.importorskip("mujoco")
     with pytest.raises(ValueError, match="do not prescribe the whole motion"):
         simulate("mujoco", SCENES["planar_slider_crank"](), 5, NEWTON, tolerance=1e-10, turn=0.1)
-
-
-def out_of_reach() -> Scene:
-    """A driven four-bar whose coupler and rocker are too short for a whole turn of the crank."""
-    pins = ((0.0, 0.0, 0.0), (0.0, 0.3, 0.0), (0.2, 0.3, 0.0), (0.4, 0.0, 0.0))
-    names = ("ground", "crank", "coupler", "rocker", "ground")
-    bodies = [rod(names[k + 1], pins[k], pins[k + 1]) for k in range(3)]
-    joints = [hinge("ABCD"[k], names[k], names[k + 1], pins[k]) for k in range(4)]
-    driver = Driver(joint="A", polynomial=(0.0, 3.0))
-    return Scene(name="short", body=bodies, joint=joints, driver=(driver,), duration=2.0)
 
 
 def test_planar_scene_leaves_a_mechanism_that_can_leave_its_plane_unchanged() -> None:

@@ -197,7 +197,6 @@ def test_find_scenes_assembles_offsets_and_read_scenes_does_not(tmp_path):
 def test_mjcf_keeps_the_offset_of_a_coupling(tmp_path):
     """A rack whose coupling has an offset of 3 mm is written and read again. It moves alike, to 1e-12 m; the
     rack without the offset is more than 2 mm away."""
-    pytest.importorskip("mujoco")
     scene, path = shifted(rack, "teeth", 0.003), tmp_path / "rack.xml"
     formats.write(scene, path)
     back = formats.read(path).scene

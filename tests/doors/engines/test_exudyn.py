@@ -38,13 +38,6 @@ def hinge(kind: type, bodies: tuple[str, str]) -> dict[str, object]:
     return {"joint": (kind(name="J", bodies=bodies, anchor=(0.0, 0.0, 0.0), axis=SIDEWAYS),)}
 
 
-def moment_of_inertia(scene: Scene) -> float:
-    """Return the moment of inertia (kg m²) of `one_body` about SIDEWAYS through the origin (Steiner)."""
-    turn = rotations.to_matrix(np.array(scene.body[0].orientation))
-    axis = np.array(SIDEWAYS)
-    return float(axis @ turn @ np.array(INERTIA) @ turn.T @ axis) + scene.body[0].mass * 0.2**2
-
-
 def angle(scene: Scene, trajectory: Trajectory) -> np.ndarray:
     """Return the angle (k,) about SIDEWAYS since the start, modulo a turn."""
     start = scene.body[0].orientation
@@ -107,7 +100,8 @@ def test_exudyn_swings_a_body_on_a_torsion_spring_beyond_a_turn(kind: type, bodi
     spring = TorsionSpring(joint="J", stiffness=2.0, damping=0.05, natural_angle=natural)
     scene = one_body(**hinge(kind, bodies), load=(spring,))
     times = np.linspace(0, 1, 6)
-    inertia = moment_of_inertia(scene)
+    axis = rotations.to_matrix(np.array(scene.body[0].orientation)).T @ np.array(SIDEWAYS)
+    inertia = float(axis @ np.array(INERTIA) @ axis) + scene.body[0].mass * 0.2**2  # by Steiner, kg m²
     decay = 0.05 / (2 * inertia)
     damped = math.sqrt(2.0 / inertia - decay**2)
     swing = np.exp(-decay * times) * (np.cos(damped * times) + decay / damped * np.sin(damped * times))

@@ -138,9 +138,8 @@ def test_fastest_run_within_the_level_is_chosen_otherwise_the_most_accurate():
     """Engine a has three runs of family "own" within the error 1e-6: the one of 1 s, error 5e-7, is chosen,
     and family "ours" is excluded. Engine b has none within it: the one of least error is chosen."""
     # engine, family, error, seconds
-    runs = [("a", "own", *each) for each in ((1e-9, 3.0), (5e-7, 1.0), (1e-7, 2.0))] + [
-        ("a", "ours", 1e-8, 0.1)
-    ]
+    own = (1e-9, 3.0), (5e-7, 1.0), (1e-7, 2.0)
+    runs = [*(("a", "own", *each) for each in own), ("a", "ours", 1e-8, 0.1)]
     runs += [("b", "own", 1e-2, 0.1), ("b", "own", 1e-4, 0.2)]
     records = [
         {"engine": e, "family": f, "outcome": "COMPLETED", "metrics": {"error": x}, "cost": {"seconds": s}}

@@ -137,10 +137,8 @@ def test_engines_with_own_steps_move_every_pair(name):
     """All pairs but REFUSED are in one scene. Errors are below a tenth of the effect of losing a part."""
     if not installed(name):
         pytest.skip(f"{name} is not installed")
-    pairs = {
-        pair: (scene(load=loads), [scene(load=loads[k : k + 1]) for k in (0, 1)])
-        for pair, loads in PAIRS.items()
-    }
+    alone = {pair: [scene(load=(load,)) for load in loads] for pair, loads in PAIRS.items()}
+    pairs = {pair: (scene(load=loads), alone[pair]) for pair, loads in PAIRS.items()}
     for key, second in SECOND_JOINTS.items():
         pairs[key] = scene(joint=(A, C, second)), [scene(joint=(A, C))]
     pairs["a driver and a torsion spring"] = (

@@ -53,6 +53,7 @@ def error(scene: Scene, run: Trajectory) -> float:
 
 
 TERMS = Setting("terms", {"rtol": 1e-9, "min_step": 1e-4})
+MOVED = "every joint", "driven", "spherical joint", "spinning loop", "tumbling body", "floating pair"
 AT_START, LATER = 1e-13, 6e-10  # measured: accelerations at t = 0, of the largest; poses at the end
 LIGHT = 1.1e-10  # measured: accelerations of a hub of 200 kg with a body of 0.75 g, of the largest
 
@@ -70,9 +71,7 @@ def test_terms_of_drake_and_dart_give_gauss_s_accelerations(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [of("drake"), of("dart")])
-@pytest.mark.parametrize(
-    "label", ["every joint", "driven", "spherical joint", "spinning loop", "tumbling body", "floating pair"]
-)
+@pytest.mark.parametrize("label", MOVED)
 def test_terms_of_drake_and_dart_move_and_react_as_the_truth(name: str, label: str) -> None:
     """Crosscheck integrates the engine's accelerations: poses are the judge's truth to 6e-9 of the length or
     rad. Reactions balance the truth's motion of each body (``balance``), and have no part along the motion

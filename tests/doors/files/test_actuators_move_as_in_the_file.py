@@ -142,8 +142,7 @@ def test_controls_and_forces_of_motors_are_clipped_as_in_mujoco(files):
 
 def test_keyframes_are_found_by_name_and_by_number_and_an_unknown_one_is_refused_with_both(files):
     """The file has the keyframe "other" at zero, and one at 0.5 rad whose only name is its number, 1. A turn
-    of 0.5 rad about y is the quaternion (cos 0.25, 0, sin 0.25, 0). A keyframe named "0" comes before the
-    keyframe of this number."""
+    of 0.5 rad about y is the quaternion (cos 0.25, 0, sin 0.25, 0). The name "0" comes before the number."""
     text = model_of(["<motor joint='JOINT'/>"], "qpos='0.5'")
     by_number = files.scene(text, "a.xml", "--keyframe", "1")[0]
     assert by_number.body[0].orientation[2] == pytest.approx(np.sin(0.25), rel=1e-12)

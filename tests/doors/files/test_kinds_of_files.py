@@ -114,7 +114,8 @@ def test_pinocchio_builds_the_machine_of_the_urdf(name):
 
 def test_loop_is_closed_between_joints_as_between_their_child_links():
     """YAML files of parallel robots name joints. Both ways close the loop by a ball joint at one place."""
-    joints = {joint.find("child").get("link"): joint.get("name") for joint in joints_of("close.urdf")}
+    elements = ET.parse(KINDS / "close.urdf").getroot().findall("joint")
+    joints = {joint.find("child").get("link"): joint.get("name") for joint in elements}
     pair = ImportOptions(close=[f"{joints['fb']}={joints['fc']}"])
     by_joints = source(KINDS / "close.urdf", pair).imported.scene
     by_links = found("close.urdf").imported.scene
@@ -129,10 +130,6 @@ def test_each_further_attempt_to_close_a_loop_is_announced():
         source(KINDS / "straight_without_gravity.xml", ImportOptions(say=said.append))
     begun = [text.partition(":")[0] for text in said]
     assert begun == [f"closing the loops, attempt {k} of 4" for k in (2, 3, 4)]
-
-
-def joints_of(name):
-    return ET.parse(KINDS / name).getroot().findall("joint")
 
 
 def test_attribute_of_an_older_mujoco_is_named_with_the_version_that_lacks_it(tmp_path):

@@ -352,8 +352,7 @@ def test_command_animate_names_the_option_that_shows_several_branches(tmp_path, 
     ],
 )
 def test_command_animate_states_why_there_are_no_branches(words, says, tmp_path, capsys, monkeypatch):
-    """The five-bar has one branch at a quarter turn, π/2 / 124.8 s; others pass two or none, or detect
-    none."""
+    """The five-bar has one branch at a quarter turn, π/2 / 124.8 s; others pass two or none, or find none."""
     monkeypatch.chdir(tmp_path)
     assert main(["animate", *words.split(), "--branches"]) == 2
     assert says in capsys.readouterr().err and not list(tmp_path.iterdir())

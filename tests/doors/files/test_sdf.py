@@ -89,11 +89,6 @@ def read(tmp_path, text: str, **options):
     return FORMAT.read(path, ImportOptions(**options))
 
 
-def returned(scene, random, tmp_path) -> list:
-    """Return scenes read from SDF files of a scene in random frames, alone and nested in another model."""
-    return [read(tmp_path, written(scene, random, nested)).scene for nested in (False, True)]
-
-
 def assert_is_the_same_mechanism(scene, found) -> None:
     """Types of joints and rank are equal; centres, anchors (m) and accelerations by Gauss's principle (of the
     largest) are equal to rounding, and joints are closed (m)."""
@@ -123,13 +118,14 @@ def random_scene(seed: int):
     "seeds", [range(5), pytest.param(range(5, 105), marks=pytest.mark.slow)], ids=["few", "many"]
 )
 def test_random_mechanisms_return_from_sdf_in_random_frames(seeds, tmp_path):
-    """Read again, random mechanisms, most of them with three joints or more, have the same joints and rank,
-    places to 1e-12 m and accelerations to 1e-9 of the largest."""
+    """Read again, alone and nested in another model, random mechanisms, most of them with three joints or
+    more, have the same joints and rank, places to 1e-12 m and accelerations to 1e-9 of the largest."""
     scenes = [random_scene(seed) for seed in seeds]
     assert sum(len(scene.joint) > 2 for scene in scenes) > len(scenes) / 2
     for seed, scene in zip(seeds, scenes, strict=True):
-        for found in returned(scene, np.random.default_rng(seed), tmp_path):
-            assert_is_the_same_mechanism(scene, found)
+        random = np.random.default_rng(seed)
+        for nested in (False, True):
+            assert_is_the_same_mechanism(scene, read(tmp_path, written(scene, random, nested)).scene)
 
 
 LINK = """<link name="{name}"><pose>{pose}</pose><inertial><pose>{centre} 0 0 0</pose><mass>0.5</mass>

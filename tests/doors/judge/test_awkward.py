@@ -51,16 +51,14 @@ def test_reference_of_an_awkward_mechanism_is_within_its_bound(kind, seed):
 
 
 @pytest.mark.parametrize(
-    ("kind", "end", "steps", "apart"),
+    ("kind", "end", "steps", "off"),
     [("gimbal", 0.12, 100, 1e-15), ("chain_of_twenty", 0.03, 10, 1e-14)],  # measured: 5e-17; 5 steps, 1e-16
 )
-def test_formulations_of_the_reference_agree_on_a_gimbal_and_an_ill_conditioned_chain(
-    kind, end, steps, apart
-):
-    """Natural coordinates and a tree of joints share no equations; poses differ by less than ``apart`` (m,
+def test_formulations_of_the_reference_agree_on_a_gimbal_and_an_ill_conditioned_chain(kind, end, steps, off):
+    """Natural coordinates and a tree of joints share no equations; poses differ by less than ``off`` (m,
     rad). The chain's mass matrix has the condition 1e6. If formulation B rejected steps for its rounding,
     they would become ever shorter."""
     scene, times = awkward(kind, 0), np.linspace(0.0, end, 4)
     a, b = (move(scene, times, EXTENDED, seconds=SECONDS) for move in (natural_motion, tree_motion))
     assert not a.reason and not b.reason and b.steps < steps
-    assert differences(scene, a, b).max() < apart
+    assert differences(scene, a, b).max() < off

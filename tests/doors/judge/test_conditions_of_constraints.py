@@ -30,9 +30,7 @@ FORMULATIONS = pytest.mark.parametrize("formulation", [natural_motion, tree_moti
     ],
     ids=["size", "x", "-y", "moment", "moment -z"],
 )
-def test_bracket_breaks_in_the_judges_motion_where_a_component_of_its_reaction_is_at_the_limit(
-    formulation, wrench, release
-):
+def test_bracket_breaks_in_the_judges_motion_where_its_reaction_is_at_the_limit(formulation, wrench, release):
     """Force and moment (N, N m) times t act on a mass at its centre. The reaction is minus them: its size or
     component reaches the limit, 5 N or 5 N m, at 1 s. Then v = F/m (t² - 1)/2 and ω = M/I (t² - 1)/2."""
     force, moment = wrench[:3], wrench[3:]

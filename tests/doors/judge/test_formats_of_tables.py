@@ -114,9 +114,7 @@ def test_wrong_angles_of_one_or_two_digits_are_off(rows, tmp_path):
 
 
 @pytest.mark.parametrize(("form", "verdict"), [("%.3f", "right, rounded to 2 digits"), ("%.12g", "right")])
-def test_command_states_rounding_that_exceeds_a_thousandth_of_the_range_of_an_angle(
-    form, verdict, tmp_path, capsys
-):
+def test_command_states_rounding_that_exceeds_a_thousandth_of_the_range(form, verdict, tmp_path, capsys):
     """The 12 angles go from 0 to -0.098 rad. Half a unit of three decimals, 5e-4 rad, is more than a
     thousandth (SHARE) of this range, and 0.098 has two digits; half a unit of twelve digits is less."""
     double_pendulum().save(tmp_path / "scene.toml")

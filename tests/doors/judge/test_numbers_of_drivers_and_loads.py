@@ -110,10 +110,8 @@ def test_torque_that_the_mechanism_does_not_determine_is_named_and_not_right(tmp
 def wound_disc() -> Scene:
     """Return a disc of 1 kg m² on a torsion spring of 1 N m/rad, which turns by 10 sin t."""
     disc = rod("disc", (0, 0, 0), 1.0, 1.0) | {"angular_velocity": (0, 0, 10.0)}
-    parts = {
-        "joint": [hinge("A", "ground", "disc", (0, 0, 0))],
-        "load": [TorsionSpring(joint="A", stiffness=1.0)],
-    }
+    pivot = hinge("A", "ground", "disc", (0, 0, 0))
+    parts = {"joint": [pivot], "load": [TorsionSpring(joint="A", stiffness=1.0)]}
     return Scene(name="wound_disc", gravity=(0.0, 0.0, 0.0), duration=10.0, body=[disc], **parts)
 
 
@@ -126,17 +124,12 @@ def test_angles_of_a_reference_count_full_turns_whatever_samples_are_asked_for(t
     assert table["energy"] == pytest.approx(50.0, abs=1e-9)
 
 
-def torque_of_a(length: float, driven_joints: str) -> float:
-    """Return the torque of the driver of A (N m) on a parallelogram with drivers at the named joints."""
-    drivers = [Driver(joint=name, polynomial=(0.0, 1.0, 2.0)) for name in driven_joints]
-    scene = in_other_units(parallelogram(sine=0.6, cosine=0.8).with_(driver=drivers), length, 1.0)
-    return float(crosscheck.reference_table(scene, [0.01])["driver(A).torque"][0])
-
-
 @pytest.mark.parametrize("length", [1e-6, 1.0])
 def test_torque_of_one_of_two_drivers_of_one_freedom_is_not_a_number(length):
     """Drivers at A and D move one freedom, of links of 1 µm or 1 m: only the sum of torques is determined."""
-    assert np.isnan(torque_of_a(length, "AD"))
+    drivers = [Driver(joint=name, polynomial=(0.0, 1.0, 2.0)) for name in "AD"]
+    scene = in_other_units(parallelogram(sine=0.6, cosine=0.8).with_(driver=drivers), length, 1.0)
+    assert np.isnan(crosscheck.reference_table(scene, [0.01])["driver(A).torque"][0])
 
 
 @pytest.mark.parametrize(

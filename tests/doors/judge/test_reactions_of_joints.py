@@ -5,7 +5,6 @@ import pytest
 
 import crosscheck
 from crosscheck.cli import main
-from mbref.scene import Scene
 from tests.helpers.tables import FORMATS, Table, spinning_rod, write_table
 
 SPEED, PULL = 16.0, 128.0  # rad/s; m ω² r of the rod in N
@@ -18,12 +17,6 @@ def pulls(scale: float = 1.0) -> Table:
     table = {"time": TIMES, "A.force.x": -PULL * np.cos(angle), "A.force.y": -PULL * np.sin(angle)}
     table |= {f"A.{name}": 0 * TIMES for name in ("force.z", "moment.x", "moment.y")}
     return {n: c if n == "time" else scale * c for n, c in table.items()}
-
-
-def two_hinges() -> Scene:
-    """Return the spinning rod on two hinges of one axis, which share reactions in undetermined parts."""
-    rod = spinning_rod()
-    return rod.with_(joint=[rod.joint[0], rod.joint[0].model_copy(update={"name": "B"})])
 
 
 def test_table_of_the_closed_form_of_reactions_is_right_in_each_column():
@@ -42,7 +35,9 @@ def test_reactions_times_a_factor_are_off_and_the_factor_is_named(scale, says):
 
 def test_reactions_that_redundant_hinges_share_are_left_out_and_the_angle_is_judged():
     """Two hinges on one axis share the force of 128 N in parts that the constraints don't determine."""
-    found = crosscheck.judge_motion(two_hinges(), {**pulls(), "A.angle": SPEED * TIMES})
+    rod = spinning_rod()
+    twice = rod.with_(joint=[rod.joint[0], rod.joint[0].model_copy(update={"name": "B"})])
+    found = crosscheck.judge_motion(twice, {**pulls(), "A.angle": SPEED * TIMES})
     assert found.is_right and [c.name for c in found.columns] == ["A.angle"]
     assert set(found.left) == set(pulls()) - {"time"}
 

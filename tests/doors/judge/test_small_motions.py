@@ -125,7 +125,6 @@ def test_engine_s_accelerations_give_the_judge_s_eigenvalues(name):
 def test_mujoco_s_own_linearisation_has_the_judge_s_eigenvalues():
     """MuJoCo linearises a step by finite differences, whose errors are within 1e-6 for a pendulum and 1e-4
     for damped slides; relative to the largest eigenvalue."""
-    pytest.importorskip("mujoco")
     [below] = [each for each in poses(pendulum, 4) if each.stability == "stable"]
     [slides] = poses(damped_slides, 1)
     mujoco = engine("mujoco")

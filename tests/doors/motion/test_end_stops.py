@@ -256,9 +256,8 @@ def test_stop_is_refused_at_a_driven_joint_in_a_diagnosis_and_by_an_engine_witho
     adapter of Exudyn maps no stops, and MuJoCo's limits rebound."""
     with pytest.raises(SceneError, match="needs a joint without a driver"):
         door().with_(driver=[{"joint": "A", "polynomial": [0.0, 1.0]}])
-    with pytest.raises(
-        SceneError, match=r"joint\[A\]\.stop: only motions have intervals, conditions and stops"
-    ):
+    says = r"joint\[A\]\.stop: only motions have intervals, conditions and stops"
+    with pytest.raises(SceneError, match=says):
         mbref.diagnose(door())
     assert "joint 'A' has an end stop" in str(engine("exudyn").supports.missing(door()))
     assert "joint 'A' has an end stop with a restitution below" in str(engine("mujoco").cannot(door(0.0)))

@@ -63,15 +63,11 @@ def test_runs_by_generated_code_and_general_kernels_agree_in_poses_reactions_and
     assert generic.outcome == own.outcome and len(own.times) == len(times), own.message
     assert np.abs(generic.position - own.position).max() < 100 * ROUNDING
     assert np.abs(generic.orientation - own.orientation).max() < 100 * ROUNDING
-    for mine, theirs in ((own.acceleration, generic.acceleration), *_reactions(own, generic)):
+    forces = [(own.reactions[joint], generic.reactions[joint]) for joint in own.reactions or ()]
+    for mine, theirs in ((own.acceleration, generic.acceleration), *forces):
         assert np.abs(mine - theirs).max() <= 1e-5 * max(1.0, np.abs(theirs).max())
     apart = abs(generic.cost.steps - own.cost.steps)
     assert apart <= max(generic.cost.steps / 20, len(generic.crossings or ()))
-
-
-def _reactions(one, other):
-    """Return the reactions of each joint in two runs; none without masses."""
-    return [(one.reactions[joint], other.reactions[joint]) for joint in one.reactions or ()]
 
 
 @pytest.mark.parametrize("order", (4, 5, 12, 13, 30))

@@ -33,25 +33,17 @@ def ran(scene, method, times, **limits):
     return trajectory
 
 
-def displacement(times):
-    return 0.7 + 0.3 * np.cos(2 * times)
-
-
-def pendulum_angle(times):
-    """φ from the vertical of a pendulum released at π/2: sin(φ/2) = k sn(K - ω t), k² = ½."""
-    sn = ellipj(ellipk(0.5) - np.sqrt(2.0 * 9.81 / 2.7) * times, 0.5)[0]
-    return 2 * np.arcsin(np.sqrt(0.5) * sn)
-
-
 def oscillator_error(method, times, **limits):
     trajectory = ran(OSCILLATOR, method, times, **limits)
-    return np.max(np.abs(trajectory.position[:, 0, 0] - displacement(times))), trajectory.cost
+    return np.max(np.abs(trajectory.position[:, 0, 0] - 0.7 - 0.3 * np.cos(2 * times))), trajectory.cost
 
 
 def pendulum_error(method, times, **limits):
+    """By the angle φ from the vertical, released at π/2: sin(φ/2) = k sn(K - ω t), k² = ½."""
+    exact = 2 * np.arcsin(np.sqrt(0.5) * ellipj(ellipk(0.5) - np.sqrt(2 * 9.81 / 2.7) * times, 0.5)[0])
     trajectory = ran(PENDULUM, method, times, **limits)
     angle = np.arctan2(trajectory.position[:, 0, 0], -trajectory.position[:, 0, 1])
-    return np.max(np.abs(angle - pendulum_angle(times))), trajectory.cost
+    return np.max(np.abs(angle - exact)), trajectory.cost
 
 
 def slope(sizes, errors):

@@ -53,10 +53,8 @@ def test_numpy_numbers_are_stored_as_python_floats_and_integers():
     assert limits == Limits(rtol=0.5, atol=1.0, most_steps=7)
 
 
-@pytest.mark.parametrize(
-    ("option", "value"), [("--rtol", "5e-324"), ("--rtol", "1"), ("--rtol", "nan"), ("--max-step", "-1")]
-)
-def test_command_refuses_a_limit_by_the_name_of_its_option(option, value, capsys):
+@pytest.mark.parametrize("word", ["--rtol=5e-324", "--rtol=1", "--rtol=nan", "--max-step=-1"])
+def test_command_refuses_a_limit_by_the_name_of_its_option(word, capsys):
     """`mbref run` ends with status 2; ``--max-step`` is the option of ``largest_step``."""
-    assert main(["run", "four_bar", option, value]) == 2
-    assert capsys.readouterr().err.startswith(f"{option}: must be ")
+    assert main(["run", "four_bar", word]) == 2
+    assert capsys.readouterr().err.startswith(f"{word.partition('=')[0]}: must be ")

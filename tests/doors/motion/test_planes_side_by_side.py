@@ -23,21 +23,6 @@ def run_of(scene: Scene, method: str = METHOD, times=TIMES):
     return run
 
 
-def flattened(scene: Scene) -> Scene:
-    """The scene with everything at z = 0."""
-    bodies = tuple(each.model_copy(update={"position": (*each.position[:2], 0.0)}) for each in scene.body)
-    joints = tuple(each.model_copy(update={"anchor": (*each.anchor[:2], 0.0)}) for each in scene.joint)
-    return scene.with_(body=bodies, joint=joints)
-
-
-def doubled(loops: int, apart: float) -> Scene:
-    """A chain of four-bars, each joint two hinges at this distance (m)."""
-    scene, sides = find_scene(f"four_bar_chain[{loops}]"), {"l": -apart / 2, "r": apart / 2}
-    pairs = [(each, side) for each in scene.joint for side in sides]
-    joints = [hinge(f"{j.name}{side}", *j.bodies, (*j.anchor[:2], sides[side])) for j, side in pairs]
-    return scene.with_(joint=joints)
-
-
 @pytest.mark.parametrize(
     ("name", "method"),
     [
@@ -52,7 +37,9 @@ def test_planes_apart_move_as_in_one_plane_and_their_joints_carry_moments(name, 
     tolerance, 1e-10, and angular velocities (rad/s) to ten times it. Reactions balance every body by Newton's
     and Euler's equations, which needs moments out of the plane."""
     scene = find_scene(name)
-    apart, flat = run_of(scene, method), run_of(flattened(scene), method)
+    bodies = tuple(each.model_copy(update={"position": (*each.position[:2], 0.0)}) for each in scene.body)
+    joints = tuple(each.model_copy(update={"anchor": (*each.anchor[:2], 0.0)}) for each in scene.joint)
+    apart, flat = run_of(scene, method), run_of(scene.with_(body=bodies, joint=joints), method)
     assert apart.position[..., :2] == pytest.approx(flat.position[..., :2], abs=1e-11)
     assert apart.angular_velocity == pytest.approx(flat.angular_velocity, abs=1e-9)
     assert max(unbalanced(scene, apart)) < UNBALANCED, "reactions balance every body, out of the plane too"
@@ -74,7 +61,10 @@ def test_motion_turns_with_the_planes_of_a_mechanism(about):
 
 def test_two_hinges_in_place_of_one_carry_half_its_force_each():
     """The hinges are 0.2 m apart, symmetric to the plane of the links. The motion stays."""
-    single, pairs = find_scene("four_bar_chain[3]"), doubled(3, 0.2)
+    single, sides = find_scene("four_bar_chain[3]"), {"l": -0.1, "r": 0.1}
+    each = [(joint, side) for joint in single.joint for side in sides]
+    joints = [hinge(f"{j.name}{side}", *j.bodies, (*j.anchor[:2], sides[side])) for j, side in each]
+    pairs = single.with_(joint=joints)
     one, two = run_of(single), run_of(pairs)
     assert two.position == pytest.approx(one.position, abs=1e-11)  # m
     assert max(unbalanced(pairs, two)) < UNBALANCED

@@ -68,10 +68,8 @@ def cart(turning):
         spin = {"velocity": [-turning * y, 0.0, 0.0], "angular_velocity": [0.0, -turning * y / R, turning]}
         place, inertia = (0.0, y, R), [0.0225, 0.045, 0.0225]
         bodies.append({"name": side, "mass": 1.0, "inertia": inertia, "position": place, **spin})
-        joints += [
-            hinge(f"{side} hinge", "chassis", side, place, Y),
-            tread(f"{side} tread", "ground", side, place),
-        ]
+        joints.append(hinge(f"{side} hinge", "chassis", side, place, Y))
+        joints.append(tread(f"{side} tread", "ground", side, place))
     return Scene(name="cart", body=bodies, joint=joints)
 
 
@@ -200,8 +198,7 @@ def test_wheel_adds_the_inertia_of_its_turn_to_a_spring_a_motor_a_stop_and_a_lat
 
 
 def test_wheel_on_a_plank_that_swings_in_space_follows_gauss_s_principle():
-    """The judge integrates its own equations at 1e-10; positions agree to ten, accelerations to 1000 of
-    this."""
+    """The judge integrates its equations at 1e-10; positions agree to ten, accelerations to 1000 of this."""
     plank = {"name": "plank", "mass": 4.0, "inertia": [0.2, 1.0, 1.1], "position": [0.1, 0.0, -0.2]}
     wheel = {"name": "wheel", "mass": 2.0, "inertia": [0.045, 0.09, 0.05], "position": [0.1, 0.1, R]}
     plank["angular_velocity"], axis = [0.7, -0.4, 0.5], [0.2, 1.0, 0.1]
@@ -234,8 +231,7 @@ def test_reaction_has_no_power_and_accelerates_the_disc(wobbling):
     [*((each, None) for each in ("turned", "millimetres", "later")), ("millimetres", "lm1+partitioning")],
 )
 def test_motion_does_not_depend_on_frame_units_and_start(wobbling, change, method):
-    """Turned and moved, in millimetres and tonnes, or from half time on, the scene moves alike to 100
-    rtol."""
+    """Turned and moved, in millimetres and tonnes, or from half time on, it moves alike to 100 rtol."""
     turn, shift, size, begin = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), 1.0, 0
     (body,), (floor,) = WOBBLING.to_dict()["body"], WOBBLING.to_dict()["joint"]
     if change == "turned":
@@ -270,10 +266,8 @@ def test_run_ends_where_a_wheel_lies_flat_has_to_slip_or_is_at_a_singular_positi
     pace = np.sqrt(2 * MASS * G * R / (ACROSS + MASS * R**2))  # 1/s
     fall, _ = quad(lambda lean: 1 / (pace * np.sqrt(np.sin(1.2) - np.sin(lean))), 0.0, 1.2)
     assert f"the wheel of joint 'floor' lies flat on its plane, at t = {fall:.6g} s" in motion.message
-    drivers = [
-        {"joint": "track", "polynomial": [0.0, 0.3]},
-        {"joint": "axle", "polynomial": [0.0, 1.0, 0.0, 0.2]},
-    ]
+    paths = {"track": [0.0, 0.3], "axle": [0.0, 1.0, 0.0, 0.2]}
+    drivers = [{"joint": joint, "polynomial": path} for joint, path in paths.items()]
     for method, why in (
         ("mpi-svd+projection", "the wheel of joint 'rail' has to slip at t = 0.01 s"),
         ("mpi-svd+partitioning", "the rate of joint 'axle' contradicts a wheel that does not slip"),
@@ -289,9 +283,8 @@ def test_run_ends_where_a_wheel_lies_flat_has_to_slip_or_is_at_a_singular_positi
     links[0]["angular_velocity"] = [0.0, 0.0, 5.0]
     pins = [hinge("P", "ground", "crank", (-1.0, 0.0, R)), hinge("Q", "crank", "rod", (-0.5, 0.0, R))]
     motion = mbref.simulate(trolley(*pins, joint("S", "spherical", "rod", "hub", TOP), body=links))
-    assert motion.outcome is Outcome.SINGULAR_POSITION and motion.message.endswith(
-        "projection does not cross it"
-    )
+    assert motion.outcome is Outcome.SINGULAR_POSITION
+    assert motion.message.endswith("projection does not cross it")
 
 
 def test_slip_flat_wheels_and_requests_that_need_positions_are_refused_with_the_joint():

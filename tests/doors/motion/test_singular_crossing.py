@@ -106,9 +106,7 @@ def test_small_bead_on_an_arm_swings_without_a_singular_position(inertia):
 
 @pytest.mark.parametrize("loop", SWINGING)
 @pytest.mark.parametrize("distance", [1e-2, 1e-4, 1e-6])
-def test_swing_that_turns_back_before_the_flat_position_meets_its_closed_form_and_crosses_nothing(
-    loop, distance
-):
+def test_swing_that_turns_back_before_the_flat_position_meets_its_closed_form_uncrossed(loop, distance):
     """SWINGING are parallelograms of four and five bars, released ``distance`` (rad) from the flat pose, on
     the side where they swing back. Errors against the judge's closed form are below ten rtol."""
     scene = SWINGING[loop](-distance)

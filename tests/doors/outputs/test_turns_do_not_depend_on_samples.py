@@ -160,8 +160,8 @@ def test_turns_of_steady_gears_are_counted_by_their_rates_where_samples_are_turn
 
 def test_judge_sees_a_miscounted_turn_of_few_samples_as_a_change_of_energy():
     """With the run's own turns, kinetic energy and 12 (φ - 40)² / 2 J of the spring have a constant sum, to
-    1e-9 of it (CLOSE). One turn more adds 2π to φ, and 12 · 2π (φ - 40 + π) J to the sum. Without turns the
-    sum is unknown (None)."""
+    1e-9 of it (CLOSE). One turn more adds 2π to φ, and 12 · 2π (φ - 40 + π) J to the sum. Without turns it is
+    None."""
     few = mbref.simulate(wound_wheel(), times=[0.7, END])
     assert energy_series(few.mechanism, few).max() < CLOSE
     assert energy_series(few.mechanism, replace(few, angles=None)) is None

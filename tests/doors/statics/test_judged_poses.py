@@ -8,18 +8,14 @@ from mbref import Scene
 from tests.helpers.statics import DOWN, G, parallelogram, pendulum, rod, slide
 
 
-def balance_of_weights() -> Scene:
-    """Two equal weights on a rope over a pulley: in balance at every height."""
+def test_weights_in_balance_at_every_height_are_one_indifferent_equilibrium():
+    """Two weights of 1.5 kg hang on one rope over a pulley; three starts find one equilibrium."""
     places, rope = {"a": (0.0, 0.0, 0.0), "b": (0.8, -0.2, 0.0)}, {"joints": ["A", "B"], "ratio": -1.0}
     bodies = [rod(name, place, 1.5) for name, place in places.items()]
     joints = [slide(name.upper(), name, place, (0.0, 1.0, 0.0)) for name, place in places.items()]
-    coupling = [{"name": "rope", **rope}]
-    return Scene(name="weights", gravity=DOWN, body=bodies, joint=joints, coupling=coupling)
-
-
-def test_weights_in_balance_at_every_height_are_one_indifferent_equilibrium():
-    """Two weights of 1.5 kg hang on one rope over a pulley; three starts find one equilibrium."""
-    assert [each.stability for each in steady_poses(balance_of_weights(), starts=3)] == ["indifferent"]
+    parts = {"body": bodies, "joint": joints, "coupling": [{"name": "rope", **rope}]}
+    weights = Scene(name="weights", gravity=DOWN, **parts)
+    assert [each.stability for each in steady_poses(weights, starts=3)] == ["indifferent"]
 
 
 def test_flat_parallelogram_at_a_singular_position_is_left_out_and_a_hanging_one_is_found():
