@@ -6,6 +6,8 @@ measure angles. Compiled kernels use the scalar forms in ``mbref.kernels``.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -56,14 +58,23 @@ def from_matrix(matrix: np.ndarray) -> np.ndarray:
 def multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Return Hamilton products (…, 4): the rotation q followed by p."""
     p, q = np.asarray(p, dtype=float), np.asarray(q, dtype=float)
-    pw, px, py, pz = p[..., 0], p[..., 1], p[..., 2], p[..., 3]
-    qw, qx, qy, qz = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
+    if p.ndim == q.ndim == 1:  # Python's numbers take a quarter of the time of small arrays
+        return np.array(_product(*p.tolist(), *q.tolist()))
     product = np.empty(np.broadcast(p, q).shape)
-    product[..., 0] = pw * qw - px * qx - py * qy - pz * qz
-    product[..., 1] = pw * qx + px * qw + py * qz - pz * qy
-    product[..., 2] = pw * qy - px * qz + py * qw + pz * qx
-    product[..., 3] = pw * qz + px * qy - py * qx + pz * qw
+    for k, part in enumerate(_product(*(a[..., i] for a in (p, q) for i in range(4)))):
+        product[..., k] = part
     return product
+
+
+def _product(*components: Any) -> tuple[Any, ...]:
+    """Return the components of the product of p and q from theirs, which are numbers or arrays."""
+    pw, px, py, pz, qw, qx, qy, qz = components
+    return (
+        pw * qw - px * qx - py * qy - pz * qz,
+        pw * qx + px * qw + py * qz - pz * qy,
+        pw * qy - px * qz + py * qw + pz * qx,
+        pw * qz + px * qy - py * qx + pz * qw,
+    )
 
 
 def conjugate(p: np.ndarray) -> np.ndarray:
@@ -82,6 +93,9 @@ NEXT, LAST = np.array([[1, 2, 0], [2, 0, 1]])  # components after and before eac
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return vector products (…, 3); for few vectors this is several times faster than NumPy's function."""
+    if a.ndim == b.ndim == 1 and a.dtype == b.dtype == float:
+        (a0, a1, a2), (b0, b1, b2) = a.tolist(), b.tolist()
+        return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
     product = a.take(NEXT, -1) * b.take(LAST, -1) - a.take(LAST, -1) * b.take(NEXT, -1)
     return product.astype(float, copy=False) if product.dtype.kind in "iu" else product
 
