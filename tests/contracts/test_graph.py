@@ -74,10 +74,9 @@ def test_spatial_inertias_of_links_and_of_bodies_have_one_sum(scene: Scene) -> N
         start=np.zeros((4, 4)),
     )
     turned = [rotations.to_matrix(np.array(b.orientation)) for b in scene.body]
-    bodies = sum(
-        spatial_inertia(b.mass, np.array(b.position), r @ np.array(b.inertia) @ r.T)
-        for b, r in zip(scene.body, turned, strict=True)
-    )
+    pairs = zip(scene.body, turned, strict=True)
+    own = [(b.mass, np.array(b.position), r @ np.array(b.inertia) @ r.T) for b, r in pairs]
+    bodies = sum(spatial_inertia(*numbers) for numbers in own)
     assert abs(links - surplus - bodies).max() < ROUNDING * abs(bodies).max()
 
 

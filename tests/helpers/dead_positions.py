@@ -14,11 +14,8 @@ def pushed(crank: float, rod: float, angle: float, speed: float, size: float = 1
     tilt = -math.asin(crank * math.sin(angle) / rod)
     pin = (a * math.cos(angle), a * math.sin(angle), 0.0)
     slider = (pin[0] + b * math.cos(tilt), 0.0, 0.0)
-    bodies = [
-        _link("crank", (0.0, 0.0, 0.0), pin, angle, size),
-        _link("rod", pin, slider, tilt, size),
-        _link("slider", slider, slider, 0.0, size),
-    ]
+    bars = _link("crank", (0.0, 0.0, 0.0), pin, angle, size), _link("rod", pin, slider, tilt, size)
+    bodies = [*bars, _link("slider", slider, slider, 0.0, size)]
     turns = hinge("O", "ground", "crank", (0.0, 0.0, 0.0)), hinge("P", "crank", "rod", pin)
     joints = [*turns, hinge("Q", "rod", "slider", slider), slide("S", "ground", "slider", slider)]
     duration = 4.0 * (a + b - slider[0]) / (speed * size)

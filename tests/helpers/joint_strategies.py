@@ -54,9 +54,5 @@ def one_joint_scenes(draw, kind: type, driven: bool) -> Scene:
     rates = draw(st.tuples(coordinate, coordinate))
     sine = Sine(amplitude=draw(coordinate), frequency=draw(st.floats(0.5, 3)))
     driver = Driver(joint="J", polynomial=(0.0, *rates), sine=sine)
-    return Scene(
-        name="one joint",
-        body=tuple(draw(bodies(name)) for name in names),
-        joint=(joint,),
-        driver=(driver,) if driven else (),
-    )
+    drawn = tuple(draw(bodies(name)) for name in names)
+    return Scene(name="one joint", body=drawn, joint=(joint,), driver=(driver,) if driven else ())

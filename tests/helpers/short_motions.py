@@ -84,10 +84,8 @@ for _kind in ("revolute", "spherical", "translational", "cylindrical", "planar",
 def double_pendulum(name: str, load: list[Entry], gravity: list[float] = GRAVITY, **fields: object) -> Scene:
     """Return two blocks, the first on a skew hinge, the second on a cylindrical joint, with loads."""
     bodies = [block("a", (0.4, 0.1, -0.1)), block("b", (0.8, 0.4, 0.2), 0.7)]
-    joints = [
-        hinge("A", "ground", "a", (0.0, 0.0, 0.0), SKEW),
-        joint("B", "cylindrical", "a", "b", (0.6, 0.2, 0.1), axis=[0.6, 0.0, 0.8]),
-    ]
+    sleeve = joint("B", "cylindrical", "a", "b", (0.6, 0.2, 0.1), axis=[0.6, 0.0, 0.8])
+    joints = [hinge("A", "ground", "a", (0.0, 0.0, 0.0), SKEW), sleeve]
     return made(name, bodies, joints, gravity=gravity, load=load, **fields)
 
 
@@ -199,10 +197,8 @@ def coupled_point() -> Scene:
 def gears_with_armature() -> Scene:
     """Return two wheels that mesh; the first has the rotor of a motor."""
     bodies = [block("pinion", (0.0, 0.0, 0.1)), block("wheel", (0.5, 0.1, 0.0), 3.0)]
-    joints = [
-        hinge("A", "ground", "pinion", (0.05, 0.0, 0.0), armature=0.2),
-        hinge("B", "ground", "wheel", (0.5, 0.0, 0.0)),
-    ]
+    motor = hinge("A", "ground", "pinion", (0.05, 0.0, 0.0), armature=0.2)
+    joints = [motor, hinge("B", "ground", "wheel", (0.5, 0.0, 0.0))]
     return made("gears", bodies, joints, coupling=[{"name": "mesh", "joints": ["A", "B"], "ratio": -0.5}])
 
 
@@ -226,10 +222,8 @@ def screw_with_armature() -> Scene:
 def planet_with_armatures() -> Scene:
     """Return an arm and a planet on it, coupled relative to the arm."""
     bodies = [block("arm", (0.4, 0.0, 0.1)), block("planet", (0.8, 0.1, 0.0), 0.6)]
-    joints = [
-        hinge("A", "ground", "arm", (0.0, 0.0, 0.0), armature=0.05),
-        hinge("B", "arm", "planet", (0.7, 0.0, 0.0), SKEW, armature=0.03),
-    ]
+    motor = hinge("A", "ground", "arm", (0.0, 0.0, 0.0), armature=0.05)
+    joints = [motor, hinge("B", "arm", "planet", (0.7, 0.0, 0.0), SKEW, armature=0.03)]
     coupling = [{"name": "mesh", "joints": ["A", "B"], "ratio": 2.5}]
     return made("planet", bodies, joints, coupling=coupling)
 
@@ -291,10 +285,8 @@ def small_masses_on_distances() -> Scene:
 @motion
 def massless_link_between_slides() -> Scene:
     """Return a gantry: a massless slide carries a tool across."""
-    bodies = [
-        {"name": "bridge", "mass": 0.0, "inertia": [0.0] * 3, "position": [0.0, 0.0, 0.0]},
-        block("tool", (0.1, 0.2, 0.0)),
-    ]
+    bridge = {"name": "bridge", "mass": 0.0, "inertia": [0.0] * 3, "position": [0.0, 0.0, 0.0]}
+    bodies = [bridge, block("tool", (0.1, 0.2, 0.0))]
     second = slide("B", "bridge", "tool", (0.0, 0.1, 0.0), Y)
     joints = [slide("A", "ground", "bridge", (0.0, 0.0, 0.0), X), second]
     spring = {"type": "spring", "bodies": ["ground", "tool"], "points": [[-0.3, 0.4, 0.0], [0.1, 0.2, 0.0]]}

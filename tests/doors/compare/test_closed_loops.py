@@ -26,10 +26,9 @@ def test_column_turned_has_the_four_bar_rotated_by_seven_tenths_of_a_radian() ->
     """The least-squares rotation (Kabsch) of the anchors and axes of "four-bar" maps all of them onto the
     column "turned", to rounding, and has the angle 0.7 rad of the column's description."""
     by_heading = {column.heading: column.make() for column in DIFFICULTIES}
-    plain, turned = (
-        np.array([[joint.anchor, joint.axis] for joint in by_heading[name].joint]).reshape(-1, 3)
-        for name in ("four-bar", "turned")
-    )
+    scenes = (by_heading[name] for name in ("four-bar", "turned"))
+    vectors = ([[joint.anchor, joint.axis] for joint in scene.joint] for scene in scenes)
+    plain, turned = (np.array(each).reshape(-1, 3) for each in vectors)
     rotation, _ = Rotation.align_vectors(turned, plain)
     assert rotation.apply(plain) == pytest.approx(turned, abs=1e-12)
     assert rotation.magnitude() == pytest.approx(0.7, rel=1e-9)

@@ -268,10 +268,8 @@ def test_tables_of_eighty_columns_print_numbers_whole_and_no_end_time_that_is_ro
     that failed at its start has the end time -1e-8 s, by rounding: neither it nor a zero is printed."""
     errors = {"error": 2.71e-5, "error_bound": 1e-14, "energy_error": 2.5e-12}
     own = partial(record, "pinocchio", "defaults", None, metrics={**errors, "violation_position": 1.13e-13})
-    long = [
-        own(7.8125e-06, settings={"accuracy": s}, outcome=end)
-        for s, end in ((0.0001, "COMPLETED"), (7.8125e-06, "NOT_CONVERGED"))
-    ]
+    ends = {0.0001: "COMPLETED", 7.8125e-06: "NOT_CONVERGED"}
+    long = [own(7.8125e-06, settings={"accuracy": s}, outcome=end) for s, end in ends.items()]
     long.append(failed("exudyn", "alf-dual+projection, compiled"))
     console = Console(width=80, record=True, file=io.StringIO())
     long.append({**failed("exudyn", "defaults"), "t_end": -1e-08})

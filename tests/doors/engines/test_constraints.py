@@ -102,10 +102,8 @@ def differences(state: Consistent) -> Differences:
         spaces[name] = rows[:rank].T @ rows[:rank]
         accelerations[name] = np.linalg.lstsq(jacobian, gamma, rcond=RANK)[0]
     scale = 1 + np.abs(accelerations["polynomials"]).max(initial=0)
-    off = [
-        max(np.abs(of[name] - of["polynomials"]).max(initial=0) for name in ("mbref", "judge"))
-        for of in (spaces, accelerations)
-    ]
+    pairs = [[of[name] - of["polynomials"] for name in ("mbref", "judge")] for of in (spaces, accelerations)]
+    off = [max(np.abs(each).max(initial=0) for each in pair) for pair in pairs]
     return Differences(max(np.abs(phi).max(initial=0) for phi, _, _ in sets.values()), off[0], off[1] / scale)
 
 

@@ -50,10 +50,9 @@ def test_armatures_count_in_the_start_velocities_of_least_kinetic_energy():
     judge's, in long doubles, to rounding (1e-13 m/s). Without rotors they are over 1 cm/s different."""
     scene = spatial_chain()
     joints = [joint.model_copy(update={"armature": 0.0}) for joint in scene.joint]
-    exact, bare = (
-        doubles(natural_motion(each, np.zeros(1), EXTENDED, seconds=60.0).velocity[0])
-        for each in (scene, scene.with_(joint=joints))
-    )
+    scenes = scene, scene.with_(joint=joints)
+    motions = (natural_motion(each, np.zeros(1), EXTENDED, seconds=60.0) for each in scenes)
+    exact, bare = (doubles(motion.velocity[0]) for motion in motions)
     assert np.abs(mbref.simulate(scene, times=[0.0]).velocity[0] - exact).max() < 1e-13
     assert np.abs(bare - exact).max() > 0.01
 

@@ -235,10 +235,8 @@ def test_interleaved_runs_take_turns_in_one_process_after_one_untimed_round(tmp_
     process that had the engine before, and so are those of the next timing."""
     log = tmp_path / "log"
     _, served = ask(f"{FAKES}:RECORDER", converse, (), 60.0)
-    jobs = [
-        (f"{FAKES}:RECORDER", Setting("a", {"seconds": 0.5})),
-        (f"{FAKES}:RECORDER", Setting("b", {"seconds": 0.7, "outcome": "NOT_CONVERGED"})),
-    ]
+    settings = Setting("a", {"seconds": 0.5}), Setting("b", {"seconds": 0.7, "outcome": "NOT_CONVERGED"})
+    jobs = [(f"{FAKES}:RECORDER", setting) for setting in settings]
     seconds = time_interleaved(still(str(log)), TIMES, jobs, repeats=2, time_limit=60.0)
     assert seconds[0] == [0.5, 0.5], seconds
     assert len(seconds[1]) == 2 and all(map(math.isnan, seconds[1])), seconds
@@ -251,10 +249,8 @@ def test_interleaved_runs_take_turns_in_one_process_after_one_untimed_round(tmp_
 
 def test_setting_a_hundred_times_behind_the_fastest_is_timed_once(tmp_path: Path):
     """Of three repeats: 0.5 s is 500 times the fastest's 0.001 s, and 0.09 s is 90 times."""
-    jobs = [
-        (f"{FAKES}:RECORDER", Setting(name, {"seconds": seconds}))
-        for name, seconds in (("slow", 0.5), ("fast", 0.001), ("near", 0.09))
-    ]
+    costs = {"slow": 0.5, "fast": 0.001, "near": 0.09}  # s
+    jobs = [(f"{FAKES}:RECORDER", Setting(name, {"seconds": s})) for name, s in costs.items()]
     seconds = time_interleaved(still(str(tmp_path / "log")), TIMES, jobs, repeats=3, time_limit=60.0)
     assert seconds == [[0.5], [0.001] * 3, [0.09] * 3]
 

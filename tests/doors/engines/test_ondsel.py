@@ -85,10 +85,8 @@ def clockwork(swapped: bool) -> Scene:
         link("pin", "universal", "piston", "link", (-0.4, 0.7, 0.5), axes=link_axes[::turn]),
         link("end", "spherical", "link", "ground", (0.4, 0.8, 0.7)),
     )
-    drivers = (
-        Driver(joint="rev", polynomial=(0.0, 3.0, 4.0)),
-        Driver(joint="cyl", polynomial=(0.0, -1.0), sine=Sine(amplitude=0.3, frequency=5.0)),
-    )
+    wave = Driver(joint="cyl", polynomial=(0.0, -1.0), sine=Sine(amplitude=0.3, frequency=5.0))
+    drivers = (Driver(joint="rev", polynomial=(0.0, 3.0, 4.0)), wave)
     made = {"body": bodies, "joint": joints, "driver": drivers}
     return Scene(name="clockwork", gravity=(0.5, -9.81, 2.0), duration=0.3, **made)
 

@@ -141,9 +141,8 @@ def test_fastest_run_within_the_level_is_chosen_otherwise_the_most_accurate():
     own = (1e-9, 3.0), (5e-7, 1.0), (1e-7, 2.0)
     runs = [*(("a", "own", *each) for each in own), ("a", "ours", 1e-8, 0.1)]
     runs += [("b", "own", 1e-2, 0.1), ("b", "own", 1e-4, 0.2)]
-    records = [
-        {"engine": e, "family": f, "outcome": "COMPLETED", "metrics": {"error": x}, "cost": {"seconds": s}}
-        for e, f, x, s in runs
-    ]
+    numbers = [{"metrics": {"error": error}, "cost": {"seconds": s}} for *_, error, s in runs]
+    named = [{"engine": name, "family": family, "outcome": "COMPLETED"} for name, family, *_ in runs]
+    records = [one | other for one, other in zip(named, numbers, strict=True)]
     found = Judged(SCENE, {}, records).within(1e-6, lambda r: r["family"] == "own")
     assert {name: r["metrics"]["error"] for name, r in found.items()} == {"a": 5e-7, "b": 1e-4}

@@ -80,10 +80,8 @@ def test_single_and_double_precision_differ_by_rounding(name: str, mechanism: st
         pytest.skip(f"{name} is not installed")
     column = next(column for column in DIFFICULTIES if column.scene == mechanism)
     scene, times = column.make().with_(duration=0.2), np.array([0.0, 0.1, 0.2])
-    runs = [
-        engine(simulator).run(scene, times, Setting(family, {"step": 1e-3}))
-        for simulator, family in ((name, "stock"), SINGLE[name])
-    ]
+    pair, step = ((name, "stock"), SINGLE[name]), {"step": 1e-3}
+    runs = [engine(simulator).run(scene, times, Setting(family, step)) for simulator, family in pair]
     difference = float(error_series(scene, *runs).max())
     assert 1e-9 < difference < MARGIN * APART[mechanism][name], f"{difference:.1e} apart"
 

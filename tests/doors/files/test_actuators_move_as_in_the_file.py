@@ -23,10 +23,8 @@ def model_of(actuators: list[str], key: str = "", more: str = "") -> str:
     bodies = "".join(pendulum(k) for k in range(len(actuators)))
     texts = "".join(text.replace("JOINT", f"j{k}") for k, text in enumerate(actuators))
     keyframe = f"<keyframe><key name='other'/><key {key}/></keyframe>" if key else ""
-    return (
-        f"<mujoco><compiler angle='radian'/><worldbody>{bodies}</worldbody>{more}"
-        f"<actuator>{texts}</actuator>{keyframe}</mujoco>"
-    )
+    world = f"<compiler angle='radian'/><worldbody>{bodies}</worldbody>"
+    return f"<mujoco>{world}{more}<actuator>{texts}</actuator>{keyframe}</mujoco>"
 
 
 def accelerations(text: str, key: int) -> np.ndarray:

@@ -279,10 +279,8 @@ def test_command_assemble_refuses_a_negative_length_and_two_lengths_of_a_pair(my
 
 def test_command_assemble_refuses_a_pair_of_joints_with_two_meanings(tmp_path, capsys):
     """Joints are named A, B-C, C and A-B, so that A-B-C is a pair in two ways."""
-    joints = [
-        joint.model_copy(update={"name": name})
-        for joint, name in zip(pinned_four_bar().joint, ("A", "B-C", "C", "A-B"), strict=True)
-    ]
+    named = zip(pinned_four_bar().joint, ("A", "B-C", "C", "A-B"), strict=True)
+    joints = [joint.model_copy(update={"name": name}) for joint, name in named]
     path = tmp_path / "hyphens.toml"
     pinned_four_bar().with_(joint=joints).save(path)
     assert main(["assemble", str(path), "--length=A-B-C=0.5"]) == 2

@@ -45,11 +45,8 @@ def written(scene, random, nested: bool = False) -> str:
         link, centre = frame[body.name], (np.array(body.position), random_frame(random)[1])
         turn = centre[1].T @ rotations.to_matrix(np.array(body.orientation))
         own = turn @ inertia @ turn.T
-        entries = "".join(
-            f"<i{'xyz'[i]}{'xyz'[j]}>{float(own[i, j])!r}</i{'xyz'[i]}{'xyz'[j]}>"
-            for i in range(3)
-            for j in range(i, 3)
-        )
+        named = {"xyz"[i] + "xyz"[j]: float(own[i, j]) for i in range(3) for j in range(i, 3)}
+        entries = "".join(f"<i{axes}>{number!r}</i{axes}>" for axes, number in named.items())
         place = pose_text(frame[body.name], link, f' relative_to="of {body.name}"')
         text += (
             f'<link name="{body.name}">{place}<inertial>{pose_text(link, centre)}<mass>{body.mass!r}</mass>'
@@ -106,11 +103,8 @@ def assert_is_the_same_mechanism(scene, found) -> None:
 def random_scene(seed: int):
     """A random mechanism of the joints of SDF, without loads."""
     scene = at_rest(random_mechanism(seed))
-    joints = [
-        joint.model_copy(update={"armature": 0.0} if getattr(joint, "armature", 0.0) else {})
-        for joint in scene.joint
-        if joint.type in NAMES
-    ]
+    kept, none = [joint for joint in scene.joint if joint.type in NAMES], {"armature": 0.0}
+    joints = [j.model_copy(update=none if getattr(j, "armature", 0.0) else {}) for j in kept]
     return scene.with_(joint=joints, load=(), driver=(), coupling=(), gravity=(0.5, 1.0, -9.0))
 
 

@@ -21,11 +21,8 @@ def robot(*parts: str) -> str:
     return f'<robot name="r"><link name="base"/>{links}{"".join(parts)}</robot>'
 
 
-CRANKS = (
-    hinge("ja", "base", "a", "0 0 0", -1.2),
-    hinge("jb", "a", "b", "0.3 0 0", 1.2),
-    hinge("jc", "base", "c", "0.3 0 0", -1.2),
-)
+PINNED = hinge("ja", "base", "a", "0 0 0", -1.2), hinge("jb", "a", "b", "0.3 0 0", 1.2)
+CRANKS = (*PINNED, hinge("jc", "base", "c", "0.3 0 0", -1.2))
 PLACES = """<parent link="b"/><parent_origin xyz="0.3 0 0"/><child link="c"/><child_origin xyz="0.3 0 0"/>"""
 UNKNOWN = PLACES.replace('child link="c"', 'child link="q"')
 

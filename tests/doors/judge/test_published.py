@@ -63,12 +63,9 @@ def test_problem_s_own_measure_accepts_the_reference_and_refuses_a_wrong_motion(
     scene, (_, problem) = SCENES[name](), BY_SCENE[name]
     _, exact = run_and_reference(name)
     slight = rotations.from_vector(np.outer(np.arange(1, len(scene.body) + 1), (1e-3, 2e-3, 3e-3)))
-    wrong = replace(
-        exact,
-        position=exact.position + 1e-3,
-        velocity=1.02 * exact.velocity,
-        orientation=rotations.multiply(slight, exact.orientation),
-    )
+    turned = rotations.multiply(slight, exact.orientation)
+    faster = {"velocity": 1.02 * exact.velocity, "orientation": turned}
+    wrong = replace(exact, position=exact.position + 1e-3, **faster)
     good, bad = (problem.measure(scene, motion, exact) for motion in (exact, wrong))
     assert good <= problem.acceptance < bad
 

@@ -67,10 +67,8 @@ def test_equal_slider_crank_turns_by_the_energy_quadrature(name):
     (theta, rate) = motion.coordinate(np.array([end]))[0]
     top = math.sqrt(theta)
     edges = np.linspace(0, top, 200)
-    pieces = [
-        quad(lambda u: math.sqrt(2 * inertia(u * u) / 100.0), lo, hi, epsabs=0, epsrel=1e-13)[0]
-        for lo, hi in itertools.pairwise(edges)
-    ]
+    slowness, tight = lambda u: math.sqrt(2 * inertia(u * u) / 100.0), {"epsabs": 0, "epsrel": 1e-13}
+    pieces = [quad(slowness, low, high, **tight)[0] for low, high in itertools.pairwise(edges)]
     assert abs(math.fsum(pieces) - end) < 50 * ROUNDED * end
     speed = math.sqrt(200.0 * theta / inertia(theta))
     assert abs(rate - speed) < 10 * ROUNDED * speed, f"rate {rate}, energy gives {speed}"

@@ -66,10 +66,8 @@ def test_dop853_converges_with_order_eight(error, longest):
 def test_adams_of_a_largest_order_converges_with_one_order_more(error, order):
     """With local extrapolation, order k converges like order k + 1 in the number of steps, to a fifth of
     this: the order varies in the first steps of a run."""
-    runs = [
-        error(f"lm1+none/adams[max_order={order}]", np.array([0.0, 5.0]), rtol=rtol)
-        for rtol in 10.0 ** -np.arange(4, 7 + min(order, 4), 0.5)
-    ]
+    method, times = f"lm1+none/adams[max_order={order}]", np.array([0.0, 5.0])
+    runs = [error(method, times, rtol=10.0**-k) for k in np.arange(4, 7 + min(order, 4), 0.5)]
     errors, steps = [e for e, _ in runs], [cost.steps for _, cost in runs]
     assert -slope(steps, errors) == pytest.approx(order + 1, rel=1 / 5), f"errors {errors} in {steps} steps"
 

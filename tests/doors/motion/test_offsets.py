@@ -110,13 +110,8 @@ def test_ends_of_springs_move_with_their_bodies_into_the_assembled_pose():
     """The offset c = 3 mm lifts the rack, m = 1.5 kg, and turns the pinion, J = 0.2 kg m², r = 0.05 m, by the
     least displacement: the rack by c / (1 + r² m / J), to 0.5 % (STEPS). The spring's end on the rack moves
     with it, the end on the ground does not."""
-    spring = {
-        "type": "spring",
-        "bodies": ["ground", "rack"],
-        "points": [[0.5, 0.2, 0.0], [0.05, 0.2, 0.0]],
-        "stiffness": 10.0,
-        "natural_length": 0.1,
-    }
+    ends = {"bodies": ["ground", "rack"], "points": [[0.5, 0.2, 0.0], [0.05, 0.2, 0.0]]}
+    spring = {"type": "spring", **ends, "stiffness": 10.0, "natural_length": 0.1}
     scene = shifted(rack, "teeth", 0.003).with_(load=[spring])
     rise = mbref.assembled(scene).body[1].position[1] - scene.body[1].position[1]
     assert rise == pytest.approx(0.003 / (1 + 0.05**2 * 1.5 / 0.2), rel=STEPS)  # m

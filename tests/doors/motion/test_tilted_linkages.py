@@ -50,12 +50,8 @@ def scissor(plane: Plane, start: float) -> tuple[Scene, list]:
     bodies = (*cranks, plane.body("slider", z.real + 0j, 0.0))
     place = {"anchor": plane.point(z.real + 0j), "axis": plane.vector(1.0 + 0j)}
     slide = Translational(name="S", bodies=(GROUND, "slider"), **place)
-    joints = (
-        plane.hinge("A", (GROUND, "up"), 0j),
-        plane.hinge("M", ("up", "down"), z / 2),
-        plane.hinge("B", ("down", "slider"), z.real + 0j),
-        slide,
-    )
+    pins = plane.hinge("A", (GROUND, "up"), 0j), plane.hinge("M", ("up", "down"), z / 2)
+    joints = (*pins, plane.hinge("B", ("down", "slider"), z.real + 0j), slide)
     return _driven(bodies, joints), [lambda z, f=f: f(0.6 * z) for f in places]
 
 

@@ -252,10 +252,8 @@ def test_hand_of_a_gram_on_an_arm_of_a_hundred_kilograms_needs_its_own_motor():
     arm = {"name": "arm", "position": [0.5, 0.0, 0.0], "mass": 100.0, "inertia": [0.01, 8.3, 8.3]}
     hand = {"name": "hand", "position": [1.005, 0.0, 0.0], "mass": 1e-3, "inertia": [1e-9, 8e-9, 8e-9]}
     joints = [hinge("A", ("ground", "arm")), hinge("B", ("arm", "hand"), (1.0, 0.0, 0.0))]
-    drivers = [
-        {"joint": "A", "sine": {"amplitude": 0.3, "frequency": 3.0}},
-        {"joint": "B", "sine": {"amplitude": 0.5, "frequency": 5.0}},
-    ]
+    sines = {"A": (0.3, 3.0), "B": (0.5, 5.0)}
+    drivers = [{"joint": n, "sine": {"amplitude": a, "frequency": f}} for n, (a, f) in sines.items()]
     scene = Scene(name="arm", gravity=DOWN, body=[arm, hand], joint=joints, driver=drivers)
     motion = mbref.simulate(scene, times=np.linspace(0.0, 1.0, 5))
     with pytest.raises(mbref.InputError, match="at rest hand can still move"):

@@ -87,10 +87,8 @@ def test_each_exchange_of_a_hinge_ends_the_redundancy_and_keeps_the_freedom_by_t
     found = exchanges(scene)
     assert tuple(mobility(scene)) == (20, 3, 1) and {"A": "inline"} in found
     for exchange in found:
-        joints = [
-            {**hinge.model_dump(exclude={"armature", "stop"}), "type": exchange.get(hinge.name, hinge.type)}
-            for hinge in scene.joint
-        ]
+        dumped = [joint.model_dump(exclude={"armature", "stop"}) for joint in scene.joint]
+        joints = [{**each, "type": exchange.get(each["name"], each["type"])} for each in dumped]
         assert mobility(scene.with_(joint=joints))[1:] == (0, 1), exchange
 
 

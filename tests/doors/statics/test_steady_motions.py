@@ -73,10 +73,8 @@ def test_coriolis_forces_couple_two_slides_of_a_turning_table():
     slides = slide("X", "table", "cross", ORIGIN, X), slide("Y", "cross", "ball", ORIGIN, Y)
     joints = [hinge("A", ("ground", "table")), *slides]
     for stiffness, is_stable in (((20.0, 25.0), True), ((4.0, 25.0), False)):
-        loads = [
-            {"type": "slide_spring", "joint": name, "stiffness": k, "damping": 0.0}
-            for name, k in zip("XY", stiffness, strict=True)
-        ]
+        spring, pairs = {"type": "slide_spring", "damping": 0.0}, zip("XY", stiffness, strict=True)
+        loads = [{"joint": name, "stiffness": k, **spring} for name, k in pairs]
         scene = turning_pendulum(rate, body=bodies, joint=joints, load=loads)
         [each] = equilibria(scene, starts=1)
         a, b = (k - rate**2 for k in stiffness)
