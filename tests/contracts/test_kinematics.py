@@ -121,11 +121,8 @@ def test_length_of_a_single_body_is_its_way_or_its_radius_of_gyration(parts, mor
     assert constraints.scene_length(scene(body(**parts), **{"duration": 1, **more})) == pytest.approx(length)
 
 
-PARTS = scene(
-    body("b", 1.0, 0.0, 0.0),
-    body("c", 3.0, 0.0, 0.0),
-    joint=(hinge("A"), Cylindrical(name="C", bodies=("ground", "c"), anchor=O, axis=X)),
-)
+JOINTS = (hinge("A"), Cylindrical(name="C", bodies=("ground", "c"), anchor=O, axis=X))
+PARTS = scene(body("b", 1.0, 0.0, 0.0), body("c", 3.0, 0.0, 0.0), joint=JOINTS)
 POSE = constraints.initial_poses(PARTS)
 
 

@@ -57,11 +57,8 @@ def imported_from_product(path: Path) -> dict[str, str]:
         if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] in PRODUCT:
             found |= {alias.asname or alias.name: f"{node.module}.{alias.name}" for alias in node.names}
         elif isinstance(node, ast.Import):
-            found |= {
-                alias.asname or alias.name.partition(".")[0]: alias.name
-                for alias in node.names
-                if alias.name.partition(".")[0] in PRODUCT
-            }
+            roots = {alias: alias.name.partition(".")[0] for alias in node.names}
+            found |= {each.asname or root: each.name for each, root in roots.items() if root in PRODUCT}
     return found
 
 

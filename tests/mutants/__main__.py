@@ -25,11 +25,8 @@ BUDGET = 60.0  # CPU s of the tests of a mutant
 
 def main() -> int:
     """Run the command line."""
-    parser = argparse.ArgumentParser(
-        prog="python -m tests.mutants",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    given = {"description": __doc__, "formatter_class": argparse.RawDescriptionHelpFormatter}
+    parser = argparse.ArgumentParser(prog="python -m tests.mutants", **given)
     parser.add_argument("--seed", type=int, default=1, metavar="S", help="default: 1")
     parser.add_argument("--count", type=int, default=50, metavar="N", help="default: 50")
     parser.add_argument("--only", nargs="+", default=(), metavar="PATH", help="paths of sources begin so")

@@ -25,10 +25,8 @@ def runs_of(name: str) -> SceneRuns:
     first = {**run, "engine": "pinocchio"}
     second = {**first, "engine": "mujoco"}
     second["reactions"] = {j: (1.01 * np.array(w)).tolist() for j, w in first["reactions"].items()}
-    second["bodies"] = {
-        b: {**v, "acceleration": (1.01 * np.array(v["acceleration"])).tolist()}
-        for b, v in first["bodies"].items()
-    }
+    larger = {name: 1.01 * np.array(body["acceleration"]) for name, body in first["bodies"].items()}
+    second["bodies"] = {n: {**b, "acceleration": larger[n].tolist()} for n, b in first["bodies"].items()}
     (group,) = by_scene([first, second], {name: scene})
     return group
 
@@ -110,10 +108,8 @@ def test_both_branches_of_the_rhombus_move_side_by_side(parted):
     in the moving and in the still picture."""
     (block,) = [b for b in crossings.render(parted) if isinstance(b, Moving)]
     assert [title for title, _ in block.panels] == ["Branch 1, smooth", "Branch 2"]
-    assert (
-        "position 2 at t = 0.03776 s: 2 branches. In colour" in block.caption
-        and "--branches --crossing 2" in block.caption
-    )
+    assert "position 2 at t = 0.03776 s: 2 branches. In colour" in block.caption
+    assert "--branches --crossing 2" in block.caption
     smooth, fold = (svg for _, svg in block.panels)
     (behind, ahead), (also_behind, apart) = ((bars(svg, BACKGROUND), bars(svg)) for svg in (smooth, fold))
     assert len(behind) == len(apart) == 3

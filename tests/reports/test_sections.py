@@ -161,10 +161,8 @@ def test_summary_says_if_engines_move_different_mechanisms(shifts, words):
 def test_model_check_that_timed_out_is_no_difference():
     """One short motion is the truth: one that timed out is no difference, one that is 1e-4 m off is."""
     late = {**nothing("c", "x"), "outcome": "TIMED_OUT"}
-    found = [
-        by_scene(records()[:3], {scene().name: scene()}, [at_gate(0.0), other])[0].difference()
-        for other in (late, at_gate(1e-4))
-    ]
+    gates = [[at_gate(0.0), other] for other in (late, at_gate(1e-4))]
+    found = [by_scene(records()[:3], {scene().name: scene()}, each)[0].difference() for each in gates]
     assert found[0] is None and found[1] is not None
 
 

@@ -17,13 +17,8 @@ STORED = Path(__file__).parents[2] / "reports" / "stability"
 
 
 def record(ladder, difficulty, error, outcome="COMPLETED", engine="mbref", family="taylor"):
-    return {
-        "scene": stability.scene_name(ladder, difficulty),
-        "engine": engine,
-        "family": family,
-        "outcome": outcome,
-        "metrics": {"error": error},
-    }
+    named = {"scene": stability.scene_name(ladder, difficulty), "engine": engine, "family": family}
+    return {**named, "outcome": outcome, "metrics": {"error": error}}
 
 
 def test_stability_table_counts_right_ended_and_wrong_runs(snapshot):
@@ -38,10 +33,8 @@ def test_stability_table_counts_right_ended_and_wrong_runs(snapshot):
         record("gap", 3e-3, 0.5, engine="mujoco", family="projected"),
     ]
     (table,) = [b for b in section.render(records) if isinstance(b, Table)]
-    assert [tuple(row) for row in table.rows] == [
-        ("mbref", "taylor", "1", "1", "2"),
-        ("mujoco", "projected", "1", "0", "1"),
-    ]
+    counted = ("mbref", "taylor", "1", "1", "2"), ("mujoco", "projected", "1", "0", "1")
+    assert [tuple(row) for row in table.rows] == [*counted]
     assert [b.text for b in section.render(records) if isinstance(b, Text)][:2] == snapshot
 
 

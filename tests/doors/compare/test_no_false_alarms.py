@@ -34,20 +34,14 @@ def on_a_turntable() -> Scene:
     """A five-bar whose frame turns about the vertical axis, driven by a moment."""
     five_bar = SCENES["five_bar_gravity"]()
     table = Body(name="table", mass=3.0, inertia=(0.05, 0.05, 0.05), position=(0.0, 0.0, 0.0))
-    joints = [
-        joint.model_copy(update={"bodies": tuple("table" if b == GROUND else b for b in joint.bodies)})
-        for joint in five_bar.joint
-    ]
+    pairs = [tuple("table" if b == GROUND else b for b in joint.bodies) for joint in five_bar.joint]
+    moved = zip(five_bar.joint, pairs, strict=True)
+    joints = [joint.model_copy(update={"bodies": pair}) for joint, pair in moved]
     up = [-g for g in five_bar.gravity]
     turn = Revolute(name="turn", bodies=(GROUND, "table"), anchor=(0.0, 0.0, 0.0), axis=up)
     driven = Moment(body="table", moment=tuple(0.05 * g for g in up))
-    return five_bar.with_(
-        name="turntable",
-        body=[table, *five_bar.body],
-        joint=[turn, *joints],
-        load=[*five_bar.load, driven],
-        duration=0.4,
-    )
+    parts = {"body": [table, *five_bar.body], "load": [*five_bar.load, driven]}
+    return five_bar.with_(name="turntable", joint=[turn, *joints], duration=0.4, **parts)
 
 
 RIGHT = "All 3 engines are right at their best settings"

@@ -92,10 +92,8 @@ def least_effect(pair: str) -> float:
     return min(error_series(scene(), motion, both).max() for motion in alone)
 
 
-DRIVEN_SPRUNG = {
-    "driver": (Driver(joint="A", polynomial=(0.0, 2.0, 1.0)),),
-    "load": (twist("A", 13.0, 0.1, 1.4), twist("B", 3.0, 0.1, 0.5)),
-}
+DRIVEN_SPRUNG: dict = {"driver": (Driver(joint="A", polynomial=(0.0, 2.0, 1.0)),)}
+DRIVEN_SPRUNG["load"] = twist("A", 13.0, 0.1, 1.4), twist("B", 3.0, 0.1, 0.5)
 TWO_DRIVERS = Driver(joint="A", polynomial=(0.0, 2.0)), Driver(joint="B", polynomial=(0.0, -1.0, 3.0))
 SECOND_JOINTS = {
     "and a distance": Distance(name="D", bodies=("arm", "bob"), anchors=((0.5, 0.2, 0.0), (1.0, -0.4, 0.1))),
@@ -141,10 +139,8 @@ def test_engines_with_own_steps_move_every_pair(name):
     pairs = {pair: (scene(load=loads), alone[pair]) for pair, loads in PAIRS.items()}
     for key, second in SECOND_JOINTS.items():
         pairs[key] = scene(joint=(A, C, second)), [scene(joint=(A, C))]
-    pairs["a driver and a torsion spring"] = (
-        scene(**DRIVEN_SPRUNG),
-        [scene(driver=DRIVEN_SPRUNG["driver"]), scene(load=DRIVEN_SPRUNG["load"])],
-    )
+    either = [scene(driver=DRIVEN_SPRUNG["driver"]), scene(load=DRIVEN_SPRUNG["load"])]
+    pairs["a driver and a torsion spring"] = scene(**DRIVEN_SPRUNG), either
     pairs["two drivers"] = scene(driver=TWO_DRIVERS), [scene(driver=(driver,)) for driver in TWO_DRIVERS]
     served = {pair: both for pair, (both, _) in pairs.items() if engine(name).cannot(both) is None}
     assert set(pairs) - set(served) == REFUSED[name]

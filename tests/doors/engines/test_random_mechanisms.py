@@ -29,11 +29,8 @@ def compared(seed: int) -> Comparison:
 def excess(seeds: Sequence[int]) -> float:
     """Return the largest error of accelerations over MARGIN times the measured one of its engine; an error
     grows as the distance from a singular position falls."""
-    return max(
-        error / (MARGIN * MEASURED[name] / found.distance)
-        for found in map(compared, seeds)
-        for name, error in found.errors.items()
-    )
+    pairs = [(found, name) for found in map(compared, seeds) for name in found.errors]
+    return max(found.errors[name] / (MARGIN * MEASURED[name] / found.distance) for found, name in pairs)
 
 
 @pytest.mark.parametrize("seeds", [SOME, pytest.param(range(200), marks=pytest.mark.slow)], ids=["6", "200"])

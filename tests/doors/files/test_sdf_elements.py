@@ -9,10 +9,8 @@ from crosscheck.engines.sdf import reading
 from mbref.formats import Imported, ImportOptions
 from mbref.scene import SceneError
 
-MASS = (
-    "<inertial><mass>2</mass><inertia><ixx>1</ixx><iyy>2</iyy><izz>2.5</izz>"
-    "<ixy>0</ixy><ixz>0</ixz><iyz>0</iyz></inertia></inertial>"
-)
+MOMENTS = "<ixx>1</ixx><iyy>2</iyy><izz>2.5</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz>"
+MASS = f"<inertial><mass>2</mass><inertia>{MOMENTS}</inertia></inertial>"
 LINK = f'<link name="b"><pose>1 2 3 0 0 0</pose>{MASS}</link>'
 GRAVITY = "<gravity>0 0 -9</gravity>"
 
@@ -35,10 +33,8 @@ def test_links_without_inertial_and_worlds_without_gravity_get_sdf_s_defaults(tm
     bare += '<link name="d"><inertial><inertia/></inertial></link>'
     found = read(tmp_path, bare, gravity="")
     assert [(body.mass, body.inertia) for body in found.scene.body] == [(1.0, (1.0, 1.0, 1.0))] * 3
-    assert found.notes == (
-        "link 'b' has no inertial: 1 kg and 1 kg m², the defaults of SDF",
-        "gravity is 9.8 m/s² downwards, the default of SDF",
-    )
+    mass = "link 'b' has no inertial: 1 kg and 1 kg m², the defaults of SDF"
+    assert found.notes == (mass, "gravity is 9.8 m/s² downwards, the default of SDF")
     assert found.scene.gravity == (0.0, 0.0, -9.8) and not read(tmp_path, LINK).notes
 
 

@@ -183,12 +183,8 @@ def test_wheel_adds_the_inertia_of_its_turn_to_a_spring_a_motor_a_stop_and_a_lat
     assert bounce.velocity[:, 0, 0] == pytest.approx([0.8, -0.4]) == bounce.angular_velocity[:, 1, 1] * R
     block = {"name": "block", "mass": 3.0, "inertia": [1.0, 1.0, 1.0], "position": [1.0, 0.0, R]}
     bar = joint("bar", "distance", "hub", "block", anchors=[TOP, (1.0, 0.0, R)], active=[[0.4, 2.0]])
-    held = trolley(
-        slide("way", "ground", "block", (1.0, 0.0, R)),
-        {**bar, "engages": "anywhere"},
-        body=[block],
-        speed=0.8,
-    )
+    way = slide("way", "ground", "block", (1.0, 0.0, R))
+    held = trolley(way, {**bar, "engages": "anywhere"}, body=[block], speed=0.8)
     caught = mbref.simulate(held, times=[0.2, 0.6]).velocity[:, 0, 0]
     assert caught == pytest.approx([0.8, 0.8 * EFFECTIVE / (EFFECTIVE + 3.0)])
     rope = joint("rope", "distance", "ground", "hub", anchors=[(-1.0, 0.0, R), TOP], release={"force": 5.0})
@@ -202,10 +198,8 @@ def test_wheel_on_a_plank_that_swings_in_space_follows_gauss_s_principle():
     plank = {"name": "plank", "mass": 4.0, "inertia": [0.2, 1.0, 1.1], "position": [0.1, 0.0, -0.2]}
     wheel = {"name": "wheel", "mass": 2.0, "inertia": [0.045, 0.09, 0.05], "position": [0.1, 0.1, R]}
     plank["angular_velocity"], axis = [0.7, -0.4, 0.5], [0.2, 1.0, 0.1]
-    joints = [
-        joint("pin", "spherical", "ground", "plank"),
-        tread("tread", "plank", "wheel", (0.1, 0.1, R), axis=axis, normal=(0.1, 0.0, 1.0)),
-    ]
+    rolls = tread("tread", "plank", "wheel", (0.1, 0.1, R), axis=axis, normal=(0.1, 0.0, 1.0))
+    joints = [joint("pin", "spherical", "ground", "plank"), rolls]
     scene = Scene(name="plank", gravity=(0.0, 0.0, -G), body=[plank, wheel], joint=joints)
     exact = gauss_motion(scene, (0.0, 0.1, 0.2))
     for method in (None, "lm1+partitioning", "mpi-svd+baumgarte"):
@@ -276,10 +270,8 @@ def test_run_ends_where_a_wheel_lies_flat_has_to_slip_or_is_at_a_singular_positi
         motion = mbref.simulate(trolley(driver=drivers), method, times=[0.0, 0.5, 1.0])
         assert motion.outcome is Outcome.VIOLATION and why in motion.message, motion.message
         drivers[1]["polynomial"][3] = 1e-3  # rad/s³; then the rates differ by 2e-3
-    links = [
-        {"name": n, "mass": 1.0, "inertia": [0.1, 0.1, 0.1], "position": [x, 0.0, R]}
-        for n, x in (("crank", -0.75), ("rod", -0.25))
-    ]
+    bar = {"mass": 1.0, "inertia": [0.1, 0.1, 0.1]}
+    links = [{"name": n, "position": [x, 0.0, R], **bar} for n, x in (("crank", -0.75), ("rod", -0.25))]
     links[0]["angular_velocity"] = [0.0, 0.0, 5.0]
     pins = [hinge("P", "ground", "crank", (-1.0, 0.0, R)), hinge("Q", "crank", "rod", (-0.5, 0.0, R))]
     motion = mbref.simulate(trolley(*pins, joint("S", "spherical", "rod", "hub", TOP), body=links))

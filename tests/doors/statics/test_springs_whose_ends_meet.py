@@ -24,11 +24,9 @@ def tied(kind: str, damping: float, moving: bool = False) -> Scene:
     block = {"name": "block", "mass": MASS, "inertia": [1.0, 1.0, 1.0], "position": AT_THE_PIN}
     if moving:
         block["velocity"] = VELOCITY if kind == "plane" else (1.0, 0.0, 0.0)
-    guide = (
-        slide("S", "ground", "block", AT_THE_PIN)
-        if kind == "slide"
-        else joint("P", "planar", "ground", "block", axis=[0.0, 0.0, 1.0])
-    )
+    guide = slide("S", "ground", "block", AT_THE_PIN)
+    if kind != "slide":
+        guide = joint("P", "planar", "ground", "block", axis=[0.0, 0.0, 1.0])
     load = spring("ground", AT_THE_PIN, "block", AT_THE_PIN, STIFFNESS, 0.0, damping)
     fall = (0.0, FALL, 0.0) if moving else AT_THE_PIN
     return Scene(name="tied", gravity=fall, duration=1.0, body=[block], joint=[guide], load=[load])
