@@ -85,6 +85,8 @@ def _say_uncounted(names: Sequence[str]) -> None:
 
 
 def _nothing(found: Judgement) -> str:
+    if not found.is_searched:
+        return "No explanation is searched for where constraints come and go or stops are met"
     if found.alike:
         return f"{found.alike} changes explain the difference equally well, so that none is named"
     if found.is_complete:

@@ -89,6 +89,15 @@ def at_start(scene: Scene) -> Scene:
     )
 
 
+def always_held(scene: Scene) -> Scene:
+    """Return a scene with the joints that hold at all times, and without drivers and couplings, for numbers
+    that need no other constraint; without intervals, conditions and stops the scene itself."""
+    if not has_pieces(scene):
+        return scene
+    joints = [permanent(joint) for joint in scene.joint if joint.is_permanent]
+    return scene.with_(joint=joints, coupling=[], driver=[])
+
+
 def changed(scene: Scene, before: Scene, t: float, met: Collection[str] = ()) -> set[str]:
     """Return the names of the joints and couplings that hold after an event at t (s).
 

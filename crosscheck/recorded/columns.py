@@ -8,6 +8,7 @@ import numpy as np
 
 from crosscheck.judge.constraints import joint_coordinates, joint_rates, scene_length
 from crosscheck.judge.joint_coordinates import COORDINATES
+from crosscheck.judge.pieces import always_held
 from crosscheck.judge.start import start_coordinates, started
 from crosscheck.recorded.actions import action_names, actions
 from crosscheck.recorded.reactions import reaction_names, reactions
@@ -70,19 +71,21 @@ def kind_of(column: str) -> str:
 
 
 def names(scene: Scene) -> list[str]:
-    """Return the names of all columns that a motion of the scene can have, without time."""
+    """Return the names of all columns that a motion of the scene can have, without time. Where constraints
+    come and go, drivers, reactions and joints that do not always hold have none."""
+    held = always_held(scene)
     found = [
         f"{body.name}.{kind}.{axis}" for body in scene.body for kind, axes in VECTORS.items() for axis in axes
     ]
-    moving = [joint for joint in scene.joint if joint.facts.coordinates]
+    moving = [joint for joint in held.joint if joint.facts.coordinates]
     found += [f"{joint.name}.{kind}" for joint in moving for kind in COORDINATES]
     found += [f"{joint.name}.{RATES[kind]}" for joint in moving for kind in joint.facts.coordinates]
-    return found + action_names(scene) + reaction_names(scene)
+    return found + action_names(held) + (reaction_names(scene) if held is scene else [])
 
 
 def values(scene: Scene, motion: Trajectory, wanted: Collection[str] | None = None) -> dict[str, np.ndarray]:
     """Return columns (k,) of a motion, in SI units: all but reactions, or at least the ``wanted`` ones."""
-    found: dict[str, np.ndarray] = {}
+    held, found = always_held(scene), dict[str, np.ndarray]()
     for b, body in enumerate(scene.body):
         for kind, axes in VECTORS.items():
             array = getattr(motion, kind)
@@ -90,17 +93,17 @@ def values(scene: Scene, motion: Trajectory, wanted: Collection[str] | None = No
                 array = _continuous(array[:, b]) if kind == "orientation" else array[:, b]
                 found.update({f"{body.name}.{kind}.{axis}": array[:, i] for i, axis in enumerate(axes)})
     pose = motion.position, motion.orientation
-    coordinates = joint_coordinates(scene, motion.times, *pose, motion.angular_velocity, motion.angles)
-    rates = joint_rates(scene, *pose, motion.velocity, motion.angular_velocity)
-    for joint in scene.joint:
+    coordinates = joint_coordinates(held, motion.times, *pose, motion.angular_velocity, motion.angles)
+    rates = joint_rates(held, *pose, motion.velocity, motion.angular_velocity)
+    for joint in held.joint:
         if joint.facts.coordinates:
             for i, kind in enumerate(COORDINATES):
                 found[f"{joint.name}.{kind}"] = coordinates[joint.name][:, i]
                 if kind in joint.facts.coordinates:
                     found[f"{joint.name}.{RATES[kind]}"] = rates[joint.name][:, i]
     if wanted is None or not set(wanted) <= set(found):
-        found.update(actions(scene, motion, found))
-    return {**found, **reactions(scene, motion, wanted or ())}
+        found.update(actions(held, motion, found))
+    return {**found, **(reactions(scene, motion, wanted or ()) if held is scene else {})}
 
 
 def start_columns(scene: Scene) -> dict[str, float]:

@@ -26,8 +26,8 @@ FINEST = 16  # multiple of DENSE at which the search for full turns between samp
 
 @dataclass(frozen=True)
 class Exact:
-    """The exact motion at the times (k,) at which it is known, the bound (k,) on its error, and the reason
-    for its end.
+    """The exact motion at the times (k,) at which it is known, the bound (k,) on its error, the reason for
+    its end, and the times (s) of events, at which constraints come or go or stops are met.
 
     The bound is a distance over the mechanism's length, or an angle (rad).
     """
@@ -35,6 +35,7 @@ class Exact:
     motion: Trajectory
     bound: np.ndarray
     reason: str
+    events: tuple[float, ...] = ()
 
 
 def exact(scene: Scene, times: Sequence[float] | np.ndarray, seconds: float = SECONDS) -> Exact:
@@ -52,7 +53,9 @@ def exact(scene: Scene, times: Sequence[float] | np.ndarray, seconds: float = SE
             return Exact(motion, np.full(len(motion.times), family.accuracy), reason)
     found = reference(scene, times.tolist(), seconds)
     part = found.part if isinstance(found, NoReference) else found
-    return Exact(trajectory(scene, part), part.bound, getattr(found, "reason", ""))
+    return Exact(
+        trajectory(scene, part), part.bound, getattr(found, "reason", ""), tuple(part.events.tolist())
+    )
 
 
 def dense_exact(

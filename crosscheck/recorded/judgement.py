@@ -3,13 +3,14 @@ begins, and likely causes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from crosscheck.judge.pieces import has_pieces
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.start import started
 from crosscheck.judge.tolerances import FLOOR
@@ -42,6 +43,7 @@ class Judgement:
     is_complete: bool = True  # False if the search for explanations ended by its limit of CPU time
     is_whole: bool = True  # False if the exact motion ends before the table
     ignored: tuple[str, ...] = ()  # columns of the table that are not of the scene
+    is_searched: bool = True  # False for scenes with events, of which no explanations are known
 
     @property
     def is_right(self) -> bool:
@@ -57,7 +59,7 @@ class Judgement:
             "not judged": list(self.left),
             "not counted": list(self.uncounted),
             "alike": self.alike,
-            "searched": self.is_complete,
+            "searched": self.is_complete and self.is_searched,
             "ignored": list(self.ignored),
             "columns": [{**vars(c), "right": c.is_right} for c in self.columns],
             "explanations": [vars(e) for e in self.explanations],
@@ -95,9 +97,11 @@ def judge_motion(
     recording = _as_recording(scene, motion)
     scene = scene.reaching(max(recording.times, default=0.0))
     recording, scene = _from_start(scene, recording), started(scene)
-    sides = [t for both in leaps(scene, recording.times).values() for t in both]
-    times = np.union1d(recording.times, sides)
+    times = _with_sides_of_leaps(scene, recording)
     found, columns = dense_exact(scene, times, seconds, recording.columns)
+    if found.events:
+        times = _with_sides_of_leaps(scene, recording, found.events)
+        found, columns = dense_exact(scene, times, seconds, recording.columns)
     if not (found.motion.times >= recording.times[0]).any():
         raise SceneError([f"{scene.name}: has no reference: {found.reason}"])
     compared, later = _compared(scene, recording, found, columns, tolerance)
@@ -105,6 +109,11 @@ def judge_motion(
         found, columns = dense_exact(scene, times, seconds, recording.columns, FINER * DENSE)
         compared, later = _compared(scene, recording, found, columns, tolerance)
     return _judged(scene, recording, found, (columns, compared, later), progress)
+
+
+def _with_sides_of_leaps(scene: Scene, recording: Recording, events: Sequence[float] = ()) -> np.ndarray:
+    """Return the times (s) of a recording, with both sides of leaps at which it has samples."""
+    return np.union1d(recording.times, [*leaps(scene, recording.times, events).values()])
 
 
 def _as_recording(scene: Scene, motion: Any) -> Recording:
@@ -155,7 +164,7 @@ def _compared(
     recorded = with_signs(exact, {n: recording.columns[n][known] for n in judged})
     rounding = {n: recording.rounding[n][known] if n in recording.rounding else 0 * times for n in judged}
     error = float(found.bound[places].max())
-    later = splines(scene, found.motion.times, whole)
+    later = splines(scene, found.motion.times, whole, found.events)
     compared = Compared(
         times,
         recorded,
@@ -166,7 +175,8 @@ def _compared(
         recording.digits,
         scale,
     )
-    sides = {k: both for k, both in leaps(scene, times).items() if both[1] <= found.motion.times[-1]}
+    near = leaps(scene, times, found.events)
+    sides = {k: both for k, both in near.items() if both[1] <= found.motion.times[-1]}
     compared = with_sides(compared, sides, found.motion.times, whole)
     if "time" in recording.rounding:
         compared = aligned(compared, recording.rounding["time"][known], later)
@@ -182,7 +192,7 @@ def _judged(
 ) -> Judgement:
     columns, compared, later = parts
     errors, causes = compared.errors(), Search()
-    if not compared.is_right:
+    if not (compared.is_right or has_pieces(scene)):
         if progress is not None:
             progress(f"searching for an explanation, at most {SEARCHED:g} CPU s")
         causes = search(scene, compared, later, float(found.motion.times[-1]))
@@ -200,4 +210,5 @@ def _judged(
         *searched,
         is_whole=bool(known.all()),
         ignored=tuple(recording.ignored),
+        is_searched=not has_pieces(scene),
     )

@@ -1,9 +1,10 @@
-"""Samples at times at which a load is switched: accelerations and forces leap there, and a tool may write the
-values before or after the leap."""
+"""Samples at times at which a load is switched, or at which constraints come or go or a stop is met:
+accelerations and forces leap there, at events velocities too, and a tool may write the values before or after
+the leap."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,17 +14,18 @@ from crosscheck.recorded.column_errors import Compared
 from mbref.scene import Scene
 
 SAME = 4 * float(np.finfo(float).eps)  # relative difference of times by their rounding
+LOCATED = 1e-9  # relative error of the time of an event that a tool locates by itself
 BEFORE = 1e-12  # time before a leap / its time, at which all numbers have their values before it
 
 
-def leaps(scene: Scene, times: np.ndarray) -> dict[int, tuple[float, float]]:
-    """Return for each sample (k,) at a time of switching, up to rounding, a time before the leap and the time
-    of the leap (s)."""
+def leaps(scene: Scene, times: np.ndarray, events: Sequence[float] = ()) -> dict[int, tuple[float, float]]:
+    """Return for each sample (k,) at a time of switching, up to rounding, or at an event, within LOCATED, a
+    time before the leap and the time of the leap (s)."""
     switched = {t for f in functions_of(scene) for t in f.interval if 0.0 < t < np.inf}
     found = {}
-    for time in switched:
+    for time, near in (*((t, SAME) for t in switched), *((t, LOCATED) for t in events if t > 0.0)):
         k = int(np.argmin(np.abs(times - time)))
-        if abs(times[k] - time) <= SAME * time:
+        if abs(times[k] - time) <= near * time:
             found[k] = (time * (1 - BEFORE), time)
     return found
 

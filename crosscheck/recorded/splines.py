@@ -1,7 +1,9 @@
-"""Splines through the columns of a motion, in pieces between the times at which drivers and loads change."""
+"""Splines through the columns of a motion, in pieces between the times at which drivers and loads change, and
+between events."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,10 +32,12 @@ class Pieces:
         return found
 
 
-def splines(scene: Scene, times: np.ndarray, columns: dict[str, np.ndarray]) -> dict[str, Pieces]:
+def splines(
+    scene: Scene, times: np.ndarray, columns: dict[str, np.ndarray], events: Sequence[float] = ()
+) -> dict[str, Pieces]:
     """Return columns (k,) as functions of time; a piece ends where a function of time of the scene changes,
-    because accelerations and forces leap there."""
-    between = _ends(scene, times)
+    and at the times (s) of events, because accelerations, forces or velocities leap there."""
+    between = _ends(scene, times, events)
     piece = np.searchsorted(between, times, side="right")
     near = np.abs(times[:, None] - between[None]).min(axis=1, initial=np.inf) <= AT_END * times[-1]
     places = [np.flatnonzero((piece == k) & ~near) for k in range(len(between) + 1)]
@@ -43,10 +47,10 @@ def splines(scene: Scene, times: np.ndarray, columns: dict[str, np.ndarray]) -> 
     }
 
 
-def _ends(scene: Scene, times: np.ndarray) -> np.ndarray:
+def _ends(scene: Scene, times: np.ndarray, events: Sequence[float]) -> np.ndarray:
     """Return the times (s) between pieces of at least FEWEST samples."""
     found: list[float] = []
-    for end in sorted({end for function in functions_of(scene) for end in ends(function)}):
+    for end in sorted({*events, *(end for function in functions_of(scene) for end in ends(function))}):
         before = np.sum((times > (found[-1] if found else -1.0)) & (times < end))
         if before > FEWEST and np.sum(times > end) > FEWEST:
             found.append(end)
