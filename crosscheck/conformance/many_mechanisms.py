@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from crosscheck.conformance import suite
-from crosscheck.conformance.mechanisms.large_graphs import large_graph
+from crosscheck.conformance.mechanisms.large_graphs import graph_of_suite
 from crosscheck.conformance.mechanisms.random_scenes import floating, mechanism, rotor, without_masses
 from crosscheck.conformance.mechanisms.specimens import Specimen
 from crosscheck.conformance.properties import PROPERTIES
@@ -45,7 +45,7 @@ KINDS: tuple[tuple[Callable[[int], Scene], tuple[str, ...]], ...] = (
     (floating, ("energy", "momentum", "reversed")),
     (rotor, ("replayed",)),
     (without_masses, (REFUSAL,)),
-    (large_graph, ("start", "alternatives")),
+    (graph_of_suite, ("start", "alternatives")),
 )
 
 
@@ -186,7 +186,7 @@ def _record(plan: Plan, seed: int, wanted: Collection[str]) -> dict[str, Any]:
         decided = {verdict.property for verdict in verdicts if verdict.status in DECIDED}
         checks = [check for check in asked if check in wanted and check not in decided]
         if checks:
-            specimen = Specimen(draw(seed), None, True, reference_time=0.0, large=draw is large_graph)
+            specimen = Specimen(draw(seed), None, True, reference_time=0.0, large=draw is graph_of_suite)
             bench = suite.asked(runner, specimen, plan.family)
             version = bench.version if isinstance(bench, Bench) else version
             verdicts += _verdicts(plan, bench, checks) if isinstance(bench, Bench) else [bench]

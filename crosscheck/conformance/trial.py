@@ -236,9 +236,10 @@ class Bench:
 def set_up(runner: Runner, specimen: Specimen, family: str = "") -> Bench:
     """Return a bench with the engine's refusal or settings for the scene, in its best family of settings or
     the given family. Raises ChildFailed if the engine crashes when asked. A large mechanism is judged in the
-    first of the engine's alternatives, which needs no coarse run to choose its settings."""
+    first of the engine's alternatives that serves it, which needs no coarse run to choose its settings."""
     if specimen.large and not family and (alternatives := runner.alternatives):
-        family = next(iter(alternatives[0].ways.values())).family
+        ways = [way.family for way in alternatives[0].ways.values()]
+        family = next((way for way in ways if not runner.refuses(specimen.scene, way)), ways[0])
     version, cannot, settings = runner.offers(specimen.scene, family)
     return Bench(runner, specimen, version, cannot, settings, family)
 

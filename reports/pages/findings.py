@@ -27,7 +27,9 @@ def _tried(found: Finding, when: When) -> str:
     """Return the sentence on mechanisms on which `crosscheck diagnose` tries a finding."""
     parts = [f"version {' or '.join(when.versions)}"] if when.versions else []
     parts += [f"mechanisms of at least {when.loops} loop{'s' * (when.loops > 1)}"] if when.loops else []
-    parts += [f"joints of the type {' or '.join(when.joints)}"] if when.joints else []
+    parts += [f"a joint of the type {', '.join(when.joints)}"] if when.joints else []
+    parts += [f"{name} {value}" for name, value in when.settings.items()]
+    parts += [f"motions that keep the {when.keeps}"] if when.keeps else []
     command = f"`crosscheck diagnose SCENE --engine {found.engine}`"
     return f"{command} tries it on your mechanism ({', '.join(parts)}). Remedy: {when.advice}."
 

@@ -1,5 +1,5 @@
 """Random mechanisms of up to 200 bodies from seeds: forests, bodies with many joints, loops that share links,
-loops between trees, several components, redundant closures.
+loops between trees, several components, redundant closures, massless links.
 
 Joints hold at the initial poses by construction, velocities by projection. Engines are judged on them by
 accelerations at the start, which take milliseconds.
@@ -7,6 +7,7 @@ accelerations at the start, which take milliseconds.
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import cache
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from crosscheck.conformance.changes.copies import replaced
 from crosscheck.conformance.mechanisms.parts import triple
 from crosscheck.judge.connected_parts import factored, parts
-from crosscheck.judge.constraints import initial_poses, jacobian
+from crosscheck.judge.constraints import inertia_matrices, initial_poses, jacobian
 from crosscheck.judge.gauss_principle import bias
 from mbref import rotations
 from mbref.scene import GROUND, JOINT_TYPES, Body, Force, Joint, Moment, Revolute, Scene
@@ -33,6 +34,10 @@ NEAR = 8  # a loop connects a body with the nearest one of so many
 CLEAR = 1e-5  # least pivot of a mechanism's rows over the largest; nearer to singular, rounding decides
 CONTINUES = 1e-9  # residual of the acceleration equations below which a velocity belongs to a motion
 DRAWS = 100
+WITH_MASSLESS = 10  # of so many seeds, one has massless parts
+SOME = 40  # most bodies of a mechanism with massless parts, whose accelerations need all singular values
+MASSLESS = 0.15  # fraction of its bodies that are tried as massless ones
+DETERMINED = 1e-6  # least kinetic energy of a free motion over the largest one, for unit velocities
 
 
 @cache
@@ -48,6 +53,51 @@ def large_graph(seed: int, fewest: int = FEWEST, most: int = MOST) -> Scene:
         if scene := _Drawing(rng, fewest, most).scene(name):
             return scene
     raise RuntimeError(f"seed {seed}: {DRAWS} draws are next to singular positions")
+
+
+def graph_of_suite(seed: int) -> Scene:
+    """Return the large mechanism of a seed: by `massless_graph` for every tenth seed, else `large_graph`."""
+    return massless_graph(seed) if seed % WITH_MASSLESS == WITH_MASSLESS - 1 else large_graph(seed)
+
+
+@cache
+def massless_graph(seed: int) -> Scene:
+    """Return a mechanism of `large_graph` with 10 to 40 bodies, of which some between joints are massless.
+
+    The bodies with mass determine every motion.
+    """
+    scene = large_graph(seed, FEWEST, SOME)
+    jointed = Counter(name for joint in scene.joint for name in joint.bodies)
+    loaded = {load.body for load in scene.load if isinstance(load, Moment | Force)}
+    free = [body.name for body in scene.body if jointed[body.name] > 1 and body.name not in loaded]
+    most = max(1, round(MASSLESS * len(scene.body)))
+    for name in np.random.default_rng([seed, 6]).permutation(free)[:most]:
+        lighter = scene.with_(
+            body=tuple(replaced(b, mass=0.0, inertia=(0, 0, 0)) if b.name == name else b for b in scene.body)
+        )
+        scene = lighter if _is_determined(lighter) else scene
+    return scene.with_(name=f"massless_{scene.name}")
+
+
+def _is_determined(scene: Scene) -> bool:
+    """Return whether the bodies with mass have kinetic energy in each motion that the joints allow."""
+    pose = initial_poses(scene)
+    turn = rotations.to_matrix(pose[1])
+    metric = np.zeros((len(turn), 6, 6))
+    metric[:, :3, :3] = np.array([body.mass for body in scene.body])[:, None, None] * np.eye(3)
+    metric[:, 3:, 3:] = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
+    rows = jacobian(scene, 0.0, *pose)[0]
+    for part in parts(rows):
+        held = factored(rows[np.ix_(part.rows, part.columns)])
+        moves = np.linalg.qr(held.basis, mode="complete")[0][:, held.rank :]
+        within = metric[part.columns[::6] // 6]
+        energy = moves.T @ np.einsum("bij,bjk->bik", within, moves.reshape(len(within), 6, -1)).reshape(
+            moves.shape
+        )
+        found = np.linalg.eigvalsh(energy) if len(energy) else np.ones(1)
+        if found[0] < DETERMINED * found[-1]:
+            return False
+    return True
 
 
 class _Drawing:

@@ -9,20 +9,53 @@ import numpy as np
 from crosscheck.engine import Cannot, Owner
 from crosscheck.engines.shared.driver_motion import motion
 from crosscheck.engines.shared.geometry import cross_matrix
-from crosscheck.engines.shared.spanning_tree import BALL_JOINT, FREE, GROUND_LINK, SLIDE, TURN, Link, Tree
+from crosscheck.engines.shared.spanning_tree import (
+    BALL_JOINT,
+    FREE,
+    GROUND_LINK,
+    SLIDE,
+    TURN,
+    Link,
+    Tree,
+    spanning_tree,
+)
 from crosscheck.judge.constraints import initial_poses, initial_twists, jacobian
-from mbref.scene import Scene
+from mbref.scene import Distance, Scene
 
 RANK_TOLERANCE = 1e-9  # relative to the largest singular value
 
 
 def lacks_mass(scene: Scene) -> Cannot | None:
-    """Return the refusal of a scene without masses whose drivers do not determine the whole motion; None for
-    all other scenes."""
+    """Return the refusal of a scene without masses whose drivers do not determine the whole motion, or with
+    massless links that a tree cannot have; None for all other scenes."""
+    if any(body.mass == 0 for body in scene.body) and (reason := _unusable(scene)):
+        return Cannot(Owner.ADAPTER, reason)
     if scene.has_mass() or not may_move_freely(scene):
         return None
     without = ", ".join(body.name for body in scene.body if body.mass is None)
     return Cannot(Owner.MODEL, f"the drivers do not prescribe the whole motion, and {without} has no mass")
+
+
+def _unusable(scene: Scene) -> str:
+    """Return why a tree cannot have a massless link; empty if it can have all.
+
+    The rod of a distance joint takes its mass from the bodies at its ends. A link that moves no mass makes
+    the mass matrix in joint coordinates singular, although closures may determine its motion.
+    """
+    massless = {body.name for body in scene.body if body.mass == 0}
+    for joint in scene.joint:
+        if isinstance(joint, Distance) and (at := massless.intersection(joint.bodies)):
+            rod = f"distance joint {joint.name!r} at the massless link {min(at)!r}"
+            return f"{rod}: its rod takes mass from the bodies at its ends"
+    links = spanning_tree(scene).links
+    moved = [link.mass for link in links]
+    for k in reversed(range(len(links))):  # parents come first
+        if links[k].parent != GROUND_LINK:
+            moved[links[k].parent] += moved[k]
+    for link, mass in zip(links, moved, strict=True):
+        if link.freedoms and not mass:
+            return f"massless link {scene.body[link.body].name!r}: it moves no mass in the tree of joints"
+    return ""
 
 
 def may_move_freely(scene: Scene) -> bool:
