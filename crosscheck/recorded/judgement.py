@@ -99,8 +99,8 @@ def judge_motion(
     recording, scene = _from_start(scene, recording), started(scene)
     times = _with_sides_of_leaps(scene, recording)
     found, columns = dense_exact(scene, times, seconds, recording.columns)
-    if found.events:
-        times = _with_sides_of_leaps(scene, recording, found.events)
+    if len(sides := _with_sides_of_leaps(scene, recording, found.events)) > len(times):
+        times = sides
         found, columns = dense_exact(scene, times, seconds, recording.columns)
     if not (found.motion.times >= recording.times[0]).any():
         raise SceneError([f"{scene.name}: has no reference: {found.reason}"])
