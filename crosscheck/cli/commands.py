@@ -67,7 +67,7 @@ def _run(arguments: argparse.Namespace) -> int:
         if arguments.json:
             print_json(by_scene(cases, records))
         else:
-            tables.print_runs(console(), records)
+            tables.print_runs(console(), records, [case.scene for case in cases])
             for sentence in missing_truths(cases, records):
                 console().print(sentence, soft_wrap=True)
     return COMPLETED if all(r["outcome"] == Outcome.COMPLETED.label for r in records) else OTHERWISE

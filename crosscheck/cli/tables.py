@@ -28,8 +28,9 @@ from crosscheck.study.record_view import (
     never_moved,
     varied_settings,
 )
-from crosscheck.study.search.cheapest import Criterion, known_error
+from crosscheck.study.search.cheapest import Criterion, known_error, opened
 from crosscheck.study.words.speed import LEVEL, SAID, title
+from crosscheck.study.words.text import listed
 from crosscheck.study.words.verdict import Verdict
 from mbref.scene import Scene
 
@@ -44,9 +45,10 @@ NO_ENERGY = (
 TEXT_COLUMNS = 3  # number of leading columns that contain words, which may be folded
 
 
-def print_runs(console: Console, records: Sequence[Record]) -> None:
+def print_runs(console: Console, records: Sequence[Record], scenes: Sequence[Scene] = ()) -> None:
     """Print one table for each scene: settings, outcome, end time, error, violation, energy and time of every
-    run."""
+    run. ``scenes`` name couplings whose turns are not counted."""
+    known = {scene.name: scene for scene in scenes}
     header = ("engine, family", "settings", "outcome", "error", "closure", "energy", "time (s)")
     for name, group in by_scene(records).items():
         table = _table(name, header)
@@ -54,6 +56,8 @@ def print_runs(console: Console, records: Sequence[Record]) -> None:
             numbers = [error_text(r), *(_measured(r, m) for m in MEASURED)]
             table.add_row(*_identity(r, group), f"{_outcome(r)}{_at(r)}", *numbers, _seconds(r))
         console.print(table)
+        if name in known:
+            _print_uncounted(console, group, known[name])
         _print_messages(console, group)
 
 
@@ -187,6 +191,16 @@ def _print_best(console: Console, group: Judged) -> None:
     console.print(table)
     if all(r["metrics"].get("energy_error") is None for r in group.records):
         console.print(NO_ENERGY)
+    _print_uncounted(console, list(best.values()), group.scene)
+
+
+def _print_uncounted(console: Console, records: Sequence[Record], scene: Scene) -> None:
+    """Print the couplings that leave the closures of some runs unknown."""
+    unknown = [r for r in records if r["times"] and r["metrics"].get("violation_position", 0.0) is None]
+    names = dict.fromkeys(name for r in unknown for name in opened(r, scene).uncounted)
+    if names:
+        said = listed([f"coupling {name!r}" for name in names])
+        console.print(f"closure –: full turns of {said} between samples cannot be counted", markup=False)
 
 
 def _print_advice(console: Console, group: Judged, path: str) -> None:

@@ -23,11 +23,13 @@ from crosscheck.judge.energy import energy_series
 from crosscheck.judge.gauss_principle import stacked
 from crosscheck.judge.metrics import in_scene_order
 from crosscheck.judge.momentum import momentum_series
+from crosscheck.judge.openings import counted_violation, opening
 from crosscheck.judge.precision import motion_rate
 from crosscheck.judge.reaction_balance import balance, idle
 from crosscheck.judge.tolerances import GRAINS, LIKE_TRUTH, REACTIONS, SAME_MOTION, STAYS_CLOSED, UNIT_NORM
 from crosscheck.judge.violations import violation_series
 from crosscheck.refusals import shortened
+from crosscheck.study.words.text import listed
 from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Moment, Scene
@@ -68,9 +70,9 @@ def unit_orientations(bench: Bench) -> Finding:
 
 def closure(bench: Bench) -> Finding:
     """Joints and drivers hold at every sample, by the judge's own joint equations."""
-    return vanishing(
-        bench, lambda k: float(violation_series(bench.scene, bench.sweep[k]).max()), STAYS_CLOSED
-    )
+    uncounted = opening(bench.scene, bench.motion).uncounted
+    remark = f"turns of {listed(uncounted)} cannot be counted between samples" if uncounted else ""
+    return vanishing(bench, lambda k: counted_violation(bench.scene, bench.sweep[k]), STAYS_CLOSED, remark)
 
 
 def honest_end(bench: Bench) -> Finding:
@@ -78,8 +80,7 @@ def honest_end(bench: Bench) -> Finding:
     run = bench.finest.value
     if run.outcome in NO_ENDS:
         return Finding(np.inf, STAYS_CLOSED, f"{run.outcome.label} {run.message}".rstrip())
-    left = violation_series(bench.scene, in_scene_order(bench.scene, run))
-    worst = float(left.max(initial=0.0))
+    worst = counted_violation(bench.scene, in_scene_order(bench.scene, run))
     return Finding(worst if np.isfinite(worst) else np.inf, STAYS_CLOSED, run.outcome.label)
 
 

@@ -46,8 +46,8 @@ _with_reactions: dict[Any, Trajectory] = {}  # keyed by scene and states
 class Metric:
     """A metric; ``function(scene, trajectory, exact)`` returns its value, or None if the metric is not
     defined. ``exact`` is the truth's trajectory at the run's times or the first of these times, or None.
-    Numbers are never NaN; a trajectory that is not finite has infinite errors.
-    With ``per_piece``, the metric of a scene with intervals is the largest one of its pieces.
+    A trajectory that is not finite has infinite errors. With ``per_piece``, the metric of a scene with
+    intervals is the largest one of its pieces, and not defined if it is NaN for a piece.
     """
 
     function: Callable[[Scene, Trajectory, Trajectory | None], float | None]
@@ -156,6 +156,13 @@ def _violation(level: int) -> Callable[..., float | None]:
     return largest
 
 
+def _closure(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
+    """Return the largest violation of positions; NaN if turns of a coupling cannot be counted."""
+    series = violation_series(scene, trajectory)
+    is_finite = all(np.isfinite(a).all() for a in (trajectory.position, trajectory.orientation))
+    return math.nan if is_finite and np.isnan(series).any() else _largest(series)
+
+
 def _energy(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
     if has_pieces(scene):
         return events.energy_error(scene, trajectory)
@@ -184,8 +191,9 @@ def _velocity_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | No
 
 
 def _largest_of(values: Sequence[float | None]) -> float | None:
-    """Return the largest value of pieces; None if no piece has one."""
-    return max((value for value in values if value is not None), default=None)
+    """Return the largest value of pieces; None if no piece has one, or one of them is NaN."""
+    known = [value for value in values if value is not None]
+    return None if not known or any(map(math.isnan, known)) else max(known)
 
 
 def _largest(series: np.ndarray | None) -> float | None:
@@ -241,7 +249,7 @@ METRICS: dict[str, Metric] = {
     "rotation_error": Metric(_against_exact(rotation_error_series), "rad", "rotation error"),
     "scd": Metric(_correct_digits, "digits", "significant correct digits"),
     "velocity_error": Metric(_velocity_error, "", "relative velocity error"),
-    "violation_position": Metric(_violation(0), "rad", "violation of position constraints", True),
+    "violation_position": Metric(_closure, "rad", "violation of position constraints", True),
     "violation_velocity": Metric(_violation(1), "rad/s", "violation of velocity constraints", True),
     "violation_acceleration": Metric(_violation(2), "rad/s²", "violation of acceleration constraints", True),
     "energy_error": Metric(_energy, "", "drift of the energy balance / largest energy"),

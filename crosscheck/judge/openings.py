@@ -10,6 +10,7 @@ import numpy as np
 
 from crosscheck.judge import constraints
 from crosscheck.judge.events import parts
+from crosscheck.judge.violations import violation_series
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 
@@ -36,6 +37,13 @@ def opening(scene: Scene, run: Trajectory) -> Opening:
         return Opening(math.inf, math.inf)
     gaps, angles, uncounted = zip(*found, strict=True)
     return Opening(max(gaps), max(angles), tuple(dict.fromkeys(chain.from_iterable(uncounted))))
+
+
+def counted_violation(scene: Scene, run: Trajectory) -> float:
+    """Return the largest residual of a run, without couplings whose turns cannot be counted."""
+    uncounted = opening(scene, run).uncounted
+    couplings = [each for each in scene.coupling if each.name not in uncounted]
+    return float(violation_series(scene.with_(coupling=couplings), run).max(initial=0.0))
 
 
 def _of_piece(scene: Scene, run: Trajectory) -> Opening:

@@ -28,7 +28,8 @@ def violation_series(scene: Scene, trajectory: Trajectory, level: int = 0) -> np
     are divided by the scene's length, so that the unit is rad, rad/s, rad/s². None if accelerations are
     missing.
 
-    At position level couplings are included as long as full turns of their joints can be counted."""
+    At position level the residual is NaN from the first sample on at which full turns of a coupled joint
+    cannot be counted."""
     scenes = unwound(scene, trajectory) if level else [scene]
     if all(each is scene for each in scenes):
         return _violations(scene, trajectory, level)
@@ -44,7 +45,7 @@ def _violations(scene: Scene, trajectory: Trajectory, level: int) -> np.ndarray 
     if level == 0:
         residuals = constraints.closure(scene, *pose)
         gaps = constraints.coupling_gaps(scene, *pose, trajectory.angular_velocity, trajectory.angles)
-        residuals |= {name: np.nan_to_num(gap, nan=0.0) for name, gap in gaps.items()}
+        residuals |= gaps
     elif level == 1:
         residuals = constraints.closure_rates(scene, *pose, *rates)
     elif trajectory.acceleration is None or trajectory.angular_acceleration is None:

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from crosscheck.conformance.changes.copies import mapped
-from crosscheck.conformance.changes.units import times
+from crosscheck.conformance.changes.units import times, with_coordinates_times
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import JointLoad, Scene
+from mbref.scene import Coupling, Joint, JointLoad, Scene
 
 Mapped = Callable[[Any], Any]
 # reflects the body frames of a mirrored scene, so that they stay right-handed
@@ -81,6 +81,7 @@ class Isometry:
             gravity=self.polar(scene.gravity),
             body=tuple(mapped(body, fields) for body in scene.body),
             joint=tuple(joints),
+            coupling=tuple(self._coupled(scene, coupling) for coupling in scene.coupling),
             load=tuple(self._load(scene, load, fields) for load in scene.load),
         )
 
@@ -88,9 +89,16 @@ class Isometry:
         """Return the load moved as a whole; a mirror reverses displacements along an axis of rotation."""
         if not isinstance(load, JointLoad):
             return mapped(load, fields)
-        is_axial = scene.joint_named(load.joint).facts.driven != load.coordinate
-        turned = times(float(np.sign(np.linalg.det(self.matrix))) if is_axial else 1.0)
+        turned = times(self._sign(scene.joint_named(load.joint), load.coordinate))
         return mapped(load, dict.fromkeys(("force", "natural_displacement"), turned))
+
+    def _coupled(self, scene: Scene, coupling: Coupling) -> Coupling:
+        return with_coordinates_times(coupling, [self._sign(*end) for end in scene.coupled(coupling)])
+
+    def _sign(self, joint: Joint, coordinate: str) -> float:
+        """Return -1 for a displacement along an axis of rotation that a mirror reverses, otherwise 1."""
+        is_reversed = joint.facts.driven != coordinate and np.linalg.det(self.matrix) < 0
+        return -1.0 if is_reversed else 1.0
 
     def expect(self, motion: Trajectory) -> Trajectory:
         """Return the motion moved as a whole, including accelerations and reactions."""

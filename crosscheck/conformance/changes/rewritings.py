@@ -26,10 +26,14 @@ def relabelled(scene: Scene) -> Scene:
     def pair(bodies: Any) -> tuple[str, ...]:
         return tuple(names[name] for name in bodies)
 
+    def coupled(ends: Any) -> tuple[str, ...]:
+        return tuple(joints[name] for name in ends)
+
     fields = {"bodies": pair, "body": names.__getitem__, "joint": joints.__getitem__}
     return scene.with_(
         body=tuple(replaced(body, name=names[body.name]) for body in scene.body),
         joint=tuple(replaced(mapped(j, fields), name=joints[j.name]) for j in scene.joint),
+        coupling=tuple(mapped(coupling, {"joints": coupled}) for coupling in scene.coupling),
         driver=tuple(mapped(driver, fields) for driver in scene.driver),
         load=tuple(mapped(load, fields) for load in scene.load),
     )
@@ -38,8 +42,12 @@ def relabelled(scene: Scene) -> Scene:
 def renamed(scene: Scene, motion: Trajectory) -> Trajectory:
     """Return the motion under the names that `relabelled` gives."""
     joints = _joints(scene)
-    found = motion.reactions and {joints[name]: wrench for name, wrench in motion.reactions.items()}
-    return replace(motion, bodies=tuple(_name(scene, k) for k in range(len(scene.body))), reactions=found)
+    tables: dict[str, Any] = {
+        key: values and {joints.get(name, name): rows for name, rows in values.items()}
+        for key in ("reactions", "angles")
+        for values in [getattr(motion, key)]
+    }
+    return replace(motion, bodies=tuple(_name(scene, k) for k in range(len(scene.body))), **tables)
 
 
 def _joints(scene: Scene) -> dict[str, str]:
@@ -79,10 +87,14 @@ def stretched(scene: Scene) -> Scene | Outside:
 
 
 def duplicated(scene: Scene) -> Scene | Outside:
-    """Return the scene with its last joint given twice, which makes rows redundant."""
+    """Return the scene with its last joint given twice, once without armature, which makes rows redundant."""
     if not scene.joint:
         return Outside("the scene has no joint")
-    return scene.with_(joint=(*scene.joint, replaced(scene.joint[-1], name="again")))
+    return scene.with_(joint=(*scene.joint, _again(scene.joint[-1])))
+
+
+def _again(joint: Joint) -> Joint:
+    return replaced(joint, name="again", **{"armature": 0.0} if joint.reflected_inertia else {})
 
 
 def satisfied(scene: Scene) -> Scene | Outside:

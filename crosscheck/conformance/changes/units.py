@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -72,7 +72,13 @@ def in_other_units(scene: Scene, length: float, time: float) -> Scene:
 
 def _coupled_in_lengths(scene: Scene, coupling: Coupling, length: float) -> Coupling:
     """Return a coupling whose displacements are multiplied by a length."""
-    *_, last = sizes = [length if kind == DISPLACEMENT else 1.0 for _, kind in scene.coupled(coupling)]
+    ends = scene.coupled(coupling)
+    return with_coordinates_times(coupling, [length if kind == DISPLACEMENT else 1.0 for _, kind in ends])
+
+
+def with_coordinates_times(coupling: Coupling, sizes: Sequence[float]) -> Coupling:
+    """Return a coupling whose coordinates are multiplied by factors."""
+    last = sizes[-1]
     if coupling.polynomial is not None:
         law = tuple(last / sizes[0] ** k * each for k, each in enumerate(coupling.polynomial, 1))
         return mapped(coupling, {"polynomial": lambda _: law, "offset": times(last)})

@@ -1,12 +1,16 @@
 """Openings of joints: a gap is a distance of points, and angles do not depend on the size."""
 
+import io
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 import mbref
+from crosscheck.cli import tables
+from crosscheck.judge.metrics import measure
 from crosscheck.judge.openings import opening
 from crosscheck.study.search.cheapest import by_closure
 from mbref import rotations
@@ -15,6 +19,7 @@ from mbref.scene import Scene
 from tests.helpers.geared_arms import arms
 from tests.helpers.intermittent_mechanisms import carts
 from tests.helpers.parts import hinge
+from tests.reports import synthetic
 
 TIMES = np.array([0.0, 1.0])
 
@@ -88,5 +93,10 @@ def test_rack_whose_pinion_turns_too_far_between_samples_has_no_known_gap():
     assert opening(scene, run).gap < 1e-9 and run.joint("pin").angle[-1] > 20 * np.pi
     found, wanted = opening(scene, replace(run, angles=None)), by_closure(1e-3, scene)
     assert found.gap == math.inf and found.uncounted == ("teeth",)
-    record = replace(run, angles=None).to_record()
+    metrics = measure(scene, replace(run, angles=None))
+    assert metrics["violation_position"] is None and measure(scene, run)["violation_position"] < 1e-9
+    record = {**synthetic.record("a", "x", 0.1, 0.1), **replace(run, angles=None).to_record()}
+    console = Console(width=200, record=True, file=io.StringIO())
+    tables.print_runs(console, [{**record, "scene": "arms", "metrics": metrics}], [scene])
+    assert "closure –: full turns of coupling 'teeth' between samples" in console.export_text()
     assert wanted.measure(record) == math.inf and "coupling 'teeth'" in wanted.unknown(record)
