@@ -71,7 +71,10 @@ def _ensemble(options: argparse.Namespace) -> int:
             f"--count: must be at most {most} for {len(times)} samples of {len(scene.body)} bodies, "
             f"got {options.count}"
         )
-    scenes = variants(scene, [Variation.parse(text) for text in options.vary], options.count, options.seed)
+    varied = [Variation.parse(text) for text in options.vary]
+    if any(variation.path == "duration" for variation in varied):
+        raise InputError("--vary: duration changes no sample time; --duration or --times sets them for all")
+    scenes = variants(scene, varied, options.count, options.seed)
     runs, began = {}, time.perf_counter()
     with processes(options.workers) as pool, progress_bar("simulating", options.count) as progress:
         for place, run in ensemble(scenes, times, options.method, limits, pool, options.out):

@@ -103,14 +103,28 @@ def variants(scene: Scene, variations: Sequence[Variation], count: int, seed: in
     Raises
     ------
     SceneError
-        If a path leads to no number of the scene, or a variant is not a valid scene.
+        If a path leads to no number of the scene, two paths lead to one number, or a variant is not a valid
+        scene.
     """
+    _refuse_repeated(scene, [variation.path for variation in variations])
     for k in range(count):
         data = {field: getattr(scene, field) for field in Scene.model_fields}
         random = np.random.default_rng([seed, k])
         for variation in variations:
             data = replaced_at(data, variation.path, partial(_drawn, variation, random))
         yield _valid(data, k)
+
+
+def _refuse_repeated(scene: Scene, paths: Sequence[str]) -> None:
+    """Raise SceneError for two paths to one number; the last one alone would vary it."""
+    data, mark = {field: getattr(scene, field) for field in Scene.model_fields}, object()
+    marked: list[tuple[str, dict[str, Any]]] = []
+    for path in paths:
+        found = replaced_at(data, path, lambda _: mark)
+        for earlier, other in marked:
+            if found == other:
+                raise SceneError([f"{path}: varies the same number as {earlier}; give it once"])
+        marked.append((path, found))
 
 
 def _drawn(variation: Variation, random: np.random.Generator, value: Any) -> float:

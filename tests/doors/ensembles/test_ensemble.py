@@ -144,12 +144,14 @@ def test_variant_depends_on_its_seed_and_number_alone_and_differs_in_nothing_els
         ("body[3].mass=1:2", "body[3].mass: the scene has no '3'"),
         ("body[0].weight=1:2", "body[0].weight: the scene has no 'weight'"),
         ("body[0].name=1:2", "body[0].name: the scene has no number at this path"),
+        ("duration=1:2", "--vary: duration changes no sample time"),
+        ("body[0].mass=1:2 --vary body[crank].mass=3:4", "varies the same number as body[0].mass"),
         ("body[0].mass=-2:-1", "variant 0: body[crank].mass: must not be negative"),
     ],
 )
 def test_command_refuses_a_number_that_cannot_vary(text: str, says: str, capsys: pytest.CaptureFixture):
     """Faults of the syntax, the interval, the path and the number; nothing is printed on standard output."""
-    status = main(["ensemble", "four_bar", "--vary", text, "--workers", "1"])
+    status = main(["ensemble", "four_bar", "--vary", *text.split(), "--workers", "1"])
     printed = capsys.readouterr()
     assert (status, printed.out) == (2, "")
     assert says in printed.err, printed.err
