@@ -93,7 +93,12 @@ def tune(arguments: argparse.Namespace) -> int:
             for r in best
         ]
         goal = "closure" if arguments.closure else "error"
-        print_json([{"scene": scene.name, goal: wanted.level, "records": shown}])
+        document = {"scene": scene.name, goal: wanted.level, "records": shown}
+        if not best:
+            nearest = tables.nearest_of(wanted, found.records)
+            reasons = [tables.unreached(wanted, nearest)[0], *missing_truths(cases, found.records)]
+            document |= {"reason": " ".join(reasons), "nearest": public(nearest)}
+        print_json([document])
     else:
         tables.print_tuning(console(), wanted, best, found.records, scene, path)
         for sentence in missing_truths(cases, found.records):

@@ -110,8 +110,9 @@ def print_tuning(
     integrators, then settings that crosscheck integrates. If no settings reach the criterion, print the
     nearest run."""
     if not reached:
-        nearest = min(records, key=lambda r: (not is_completed(r), wanted.measure(r), -r["t_end"]))
-        console.print(_unreached(wanted, nearest), soft_wrap=True)
+        nearest = nearest_of(wanted, records)
+        reason, table = unreached(wanted, nearest)
+        console.print(f"{reason} {table}:", soft_wrap=True)
         _print_settings(console, "the nearest run", [nearest], wanted)
         return
     simulator = engine(records[0]["asked"]["engine"])
@@ -152,17 +153,22 @@ def _to_set(found: Engine, record: Record) -> str:
     return "; ".join(parts) + "."
 
 
-def _unreached(wanted: Criterion, nearest: Record) -> str:
-    """Return the sentence above the nearest run: no setting reaches the criterion, or no error is known."""
+def nearest_of(wanted: Criterion, records: Sequence[Record]) -> Record:
+    """Return the run that comes nearest to a criterion; the one that got furthest if none completes."""
+    return min(records, key=lambda r: (not is_completed(r), wanted.measure(r), -r["t_end"]))
+
+
+def unreached(wanted: Criterion, nearest: Record) -> tuple[str, str]:
+    """Return the reason why no setting reaches a criterion, and the name of the nearest run's table."""
     bound = error_bound(nearest)
     if not is_completed(nearest):
-        return f"No setting reaches {wanted.name}: no run completes. The one that got furthest:"
+        return f"No setting reaches {wanted.name}: no run completes.", "The one that got furthest"
     if not math.isfinite(wanted.measure(nearest)):
-        return f"{wanted.unknown(nearest)} One of the runs:"
+        return wanted.unknown(nearest), "One of the runs"
     if bound > wanted.level and wanted.measure is known_error:
         known = f"The truth is known to {bound:.0e}"
-        return f"{known}, so no run can be seen to reach {wanted.level:g}. The nearest:"
-    return f"No setting reaches {wanted.name}; the nearest run has {wanted.text(nearest)}:"
+        return f"{known}, so no run can be seen to reach {wanted.level:g}.", "The nearest"
+    return f"No setting reaches {wanted.name}; the nearest run has {wanted.text(nearest)}.", "The nearest run"
 
 
 def _print_verdict(console: Console, said: Verdict) -> None:

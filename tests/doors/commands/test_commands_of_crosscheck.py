@@ -305,6 +305,8 @@ def test_tune_has_exit_status_one_if_no_setting_reaches_the_error(capsys, still)
     """The engine ELSEWHERE puts every body 1 mm off; the error that is asked for by default is 1e-6."""
     status, out, err = run_main(capsys, "tune", f"{FAKES}:ELSEWHERE", still)
     assert status == 1 and "No setting reaches an error of 1e-06" in out, (out, err)
+    document = json.loads(run_main(capsys, "tune", f"{FAKES}:ELSEWHERE", still, "--json")[1])
+    assert document["reason"] in " ".join(out.split()) and document["nearest"]["metrics"]["error"] > 1e-4
 
 
 NOT_REACHED = {  # error of the only run, bound of its truth's error, outcome: the sentence that tune prints

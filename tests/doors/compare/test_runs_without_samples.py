@@ -34,7 +34,7 @@ def test_run_without_samples_has_no_metric_and_an_infinite_opening(scene: Scene)
         bodies=tuple(body.name for body in scene.body), outcome=Outcome.TIMED_OUT, message="no result",
     )  # fmt: skip
     assert set(crosscheck.measure(scene, run).values()) == {None}
-    assert opening(scene, run) == (math.inf, math.inf)
+    assert opening(scene, run) == (math.inf, math.inf, ())
 
 
 def test_comparison_reports_an_engine_that_crashes_before_its_first_sample():
