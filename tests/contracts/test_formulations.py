@@ -1,4 +1,4 @@
-"""Formulations solve the systems that they claim to solve, exactly and whatever the rows' lengths."""
+"""Formulations solve the systems that they claim to solve, to rounding and whatever the rows' lengths."""
 
 import numpy as np
 import pytest

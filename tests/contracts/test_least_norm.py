@@ -1,4 +1,4 @@
-"""Solutions of least norm and null spaces against NumPy's pseudo-inverse, for every rank."""
+"""Solutions of least norm and null spaces against NumPy's pseudo-inverse, for full and deficient ranks."""
 
 import numpy as np
 import pytest

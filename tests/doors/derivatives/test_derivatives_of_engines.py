@@ -162,7 +162,7 @@ def test_drakes_terms_are_differentiated_right_also_with_open_loops(loop, capsys
 
 @pytest.mark.slow
 def test_mujocos_derivatives_are_right_about_a_turning_body_whose_line_slides_along_a_point(tmp_path, capsys):
-    """By the judge's derivatives. MuJoCo's model is a ball joint and, behind it, a slide of one body."""
+    """The judge's are the truth. MuJoCo's model is a ball joint and, behind it, a slide of one body."""
     body = {"name": "b", "mass": 1.3, "inertia": [0.02, 0.03, 0.04], "position": [0.1, 0.0, 0.2]}
     line = {"name": "J", "type": "inline", "bodies": ["b", "ground"], "axis": [0.6, 0.0, -0.8]}
     joint, turning = {**line, "anchor": [0.3, 0.1, 0.0]}, {**body, "angular_velocity": [1.0, 2.0, 3.0]}

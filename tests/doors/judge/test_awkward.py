@@ -52,12 +52,12 @@ def test_reference_of_an_awkward_mechanism_is_within_its_bound(kind, seed):
 
 @pytest.mark.parametrize(
     ("kind", "end", "steps", "off"),
-    [("gimbal", 0.12, 100, 1e-15), ("chain_of_twenty", 0.03, 10, 1e-14)],  # measured: 5e-17; 5 steps, 1e-16
+    [("gimbal", 0.12, 100, 1e-15), ("chain_of_twenty", 0.03, 10, 1e-14)],  # measured: 5e-17 and 1e-16 m
 )
 def test_formulations_of_the_reference_agree_on_a_gimbal_and_an_ill_conditioned_chain(kind, end, steps, off):
     """Natural coordinates and a tree of joints share no equations; poses differ by less than ``off`` (m,
-    rad). The chain's mass matrix has the condition 1e6. If formulation B rejected steps for its rounding,
-    they would become ever shorter."""
+    rad), and B, the tree, takes fewer than ``steps`` steps: steps that are rejected for rounding would become
+    ever shorter. The chain's mass matrix has the condition 1e6."""
     scene, times = awkward(kind, 0), np.linspace(0.0, end, 4)
     a, b = (move(scene, times, EXTENDED, seconds=SECONDS) for move in (natural_motion, tree_motion))
     assert not a.reason and not b.reason and b.steps < steps

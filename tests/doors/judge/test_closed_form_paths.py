@@ -172,7 +172,7 @@ def test_a_weightless_pendulum_turns_at_constant_speed():
     assert found.position[:, 0] == pytest.approx(np.array([[0, -2, 0.5], [-2, 0, 0.5]]), abs=1e-12)
     assert found.velocity[:, 0] == pytest.approx(np.array([[-6, 0, 0], [0, 6, 0.0]]), abs=1e-11)
     assert found.acceleration[:, 0] == pytest.approx(np.array([[0, 18, 0], [18, 0, 0.0]]), abs=1e-11)
-    assert found.angular_velocity[:, 0] == pytest.approx(np.tile([0.0, 0.0, -3.0], (2, 1)))
+    assert found.angular_velocity[:, 0] == pytest.approx(np.tile([0.0, 0.0, -3.0], (2, 1)), abs=1e-12)
     assert found.angular_acceleration[:, 0] == pytest.approx(np.zeros((2, 3)), abs=1e-11)
 
 

@@ -1,4 +1,4 @@
-"""A table of the exact motion is right in every format of numbers; with an error of ten units it is off."""
+"""A table of the exact motion is right in random formats of numbers; with an error of ten units it is off."""
 
 import functools
 from pathlib import Path
@@ -58,7 +58,7 @@ def digits(values: np.ndarray, form: str) -> int:
 
 
 @seeds
-def test_an_exact_table_is_right_in_every_format_and_coarse_rounding_is_stated(seed, tmp_path):
+def test_an_exact_table_is_right_in_a_random_format_and_coarse_rounding_is_stated(seed, tmp_path):
     """The table is part of a reference motion, in a random format. Where the error that the judge allows
     exceeds a thousandth of a column's range, and only there, its verdict states to how many digits the
     column is rounded. A largest number such as 0.9996 may have a digit more when it is written, 1.000."""

@@ -140,7 +140,7 @@ def test_errors_that_follow_no_power_have_no_order_of_convergence(errors):
     assert order_of_convergence([0.1, 0.05, 0.025, 0.0125][: len(errors)], errors) is None
 
 
-COSTS, ERRORS = [1.0, 10.0, 100.0, 50.0], [1e-2, 1e-4, 1e-6, 1e-3]  # error = 1e-2 / cost²; the last is worse
+COSTS, ERRORS = [1.0, 10.0, 100.0, 50.0], [1e-2, 1e-4, 1e-6, 1e-3]  # error = 1e-2 / cost², but the last
 
 
 @pytest.mark.parametrize(
@@ -153,7 +153,7 @@ COSTS, ERRORS = [1.0, 10.0, 100.0, 50.0], [1e-2, 1e-4, 1e-6, 1e-3]  # error = 1e
     ids=["between two runs", "above all errors", "below all errors", "one finite error", "no finite error"],
 )
 def test_cost_at_an_error_is_read_on_the_lower_envelope_of_the_runs(costs, errors, level, cost):
-    """Errors are 1e-2 / cost² on the envelope, from cost 1 on; a worse run has no effect; none has 1e-7."""
+    """On the envelope of COSTS the error is 1e-2 / cost²; None where no run has so small an error."""
     assert cost_at_error(costs, errors, level) == pytest.approx(cost)
 
 

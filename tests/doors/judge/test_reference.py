@@ -158,7 +158,7 @@ def test_double_precision_gives_thirteen_digits():
     assert np.abs(np.asarray(one.position - other.position, dtype=float)).max() < 1e-13
 
 
-def test_saddle_points_are_solved_to_the_last_digit():
+def test_saddle_points_are_solved_to_two_hundred_roundings():
     """M x + Jᵀ y = f and J x = r with random matrices hold to 200 roundings of extended precision, 1e-19
     each: sums of 13 products, and a solve, round tens of times."""
     rng = np.random.default_rng(3)
@@ -171,7 +171,7 @@ def test_saddle_points_are_solved_to_the_last_digit():
     assert np.abs(np.einsum("min,in->m", rows, x) - rate).max() < 200 * EXTENDED.eps * np.abs(x).max()
 
 
-def test_twenty_digits_are_certified_by_both_formulations():
+def test_certified_table_of_a_pendulum_has_twenty_digits_and_the_place_of_the_closed_form():
     """The table of a pendulum has a bound of 1e-20, a hash, numbers of 22 digits or more, and the place of
     the closed form in double precision, to 1e-15 m."""
     pytest.importorskip("flint", reason="python-flint is the extra `certify`")
@@ -369,8 +369,8 @@ def test_reference_needs_no_cache_that_can_be_written(tmp_path, monkeypatch):
 
 
 def test_truth_of_a_scene_without_closed_form_is_its_reference(own_cache):
-    """A random mechanism has none: its truth is the reference, within its bound of 1e-11 of the length, or
-    None without CPU time. The rhombus has the parallelogram's closed form."""
+    """A random mechanism has none: its truth is the reference, whose bound is at most 1e-11 of the length,
+    or None without CPU time. The rhombus has the parallelogram's closed form."""
     scene = random_mechanism(3)
     assert truth_for(scene, 0.0) is None
     truth = truth_for(scene)

@@ -65,7 +65,7 @@ def referred(scene: Scene, times: np.ndarray) -> Reference:
 
 @pytest.mark.parametrize("name", a_few(list(MOTIONS), 5))
 def test_judge_computes_the_stored_states_again_within_their_bound(name):
-    """The stored bound is of poses; rates have ten times as much."""
+    """The stored bound, at least 20 roundings, is of poses; rates have ten times as much."""
     scene, exact = MOTIONS[name](), stored()[name]
     found = motion_of(scene)
     bound = max(exact["bound"], 20 * ROUNDING)
@@ -85,7 +85,7 @@ def test_both_formulations_of_a_reference_confirm_each_other_at_every_sample(nam
 
 @pytest.mark.parametrize("name", a_few(SMOOTH, 25, 3))
 def test_states_of_a_reference_do_not_depend_on_other_samples(name):
-    """The judge's states at the stored times equal the stored ones, though it is asked for six more times."""
+    """Asked for six more times, the judge has the stored states, to the sum of both bounds."""
     scene = MOTIONS[name]()
     times = np.union1d(times_of(scene), scene.duration * np.array([0.05, 0.11, 0.5, 0.52, 0.9, 0.99]))
     found = motion_of(scene, times)

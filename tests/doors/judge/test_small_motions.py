@@ -56,8 +56,8 @@ def test_judge_finds_the_eigenvalues_of_closed_forms(judged):
 
 
 def test_judge_finds_the_frequency_on_a_spring_far_shorter_than_the_mechanism():
-    """A slide of 2 kg, 1 m from its guide's anchor, is on a spring of 1 mm across the guide. The spring of
-    300 N/m is stretched to twice its natural length: half of its stiffness, 150 N/m, acts along the guide."""
+    """A slide of 2 kg, 1 m off its guide's anchor, is on a spring of 300 N/m and 1 mm across the guide, twice
+    its natural length: half of 300 N/m acts along the guide. mbref's accelerations have it to 1e-6."""
     guide = joint("A", "translational", "ground", "rod", (-0.3, 0.0, 0.0), axis=(1.0, 0.0, 0.0))
     ends = {"bodies": ["ground", "rod"], "points": [[0.7, 1e-3, 0.0], [0.7, 0.0, 0.0]]}
     spring = {"type": "spring", **ends, "stiffness": 300.0, "natural_length": 5e-4}
@@ -75,7 +75,7 @@ def test_steady_poses_are_balanced_with_symmetric_positive_mass_matrix(judged):
         assert np.abs(each.balance.unbalanced(each.state).astype(float)).max() < 1e-13
         assert error(each.eigenvalues, each.eigenvalues.conj()) < 1e-14
         mass = each.small.mass
-        assert np.allclose(mass, mass.T, rtol=1e-14) and np.linalg.eigvalsh(mass)[0] > 0
+        assert np.allclose(mass, mass.T, rtol=0, atol=1e-14 * mass.max()) and np.linalg.eigvalsh(mass)[0] > 0
 
 
 def test_four_bar_with_diagonal_spring_rests_at_the_published_angle():
@@ -170,8 +170,8 @@ def test_steady_rotation_has_the_second_body_s_sense():
     """The rate of 6 rad/s is the second body's: with (spindle, ground) the spindle turns back."""
     scene = turning_pendulum()
     backwards = scene.joint[0].model_copy(update={"bodies": ("spindle", "ground")})
-    assert np.allclose(turning(scene).spin, [0.0, 0.0, 6.0])
-    assert np.allclose(turning(scene.with_(joint=[backwards, scene.joint[1]])).spin, [0.0, 0.0, -6.0])
+    assert turning(scene).spin.tolist() == [0.0, 0.0, 6.0]
+    assert turning(scene.with_(joint=[backwards, scene.joint[1]])).spin.tolist() == [0.0, 0.0, -6.0]
 
 
 def test_driven_axis_may_lean_from_gravity_by_1e_12_rad():

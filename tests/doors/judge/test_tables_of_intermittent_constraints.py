@@ -64,8 +64,8 @@ def test_wrong_rebound_is_off_from_the_impact_on(change):
 def test_command_judges_a_table_of_carts_that_latch_at_their_common_speed(
     latched, status, says, tmp_path, capsys
 ):
-    """Carts of 1 kg at 2 m/s and 3 kg at -1 m/s latch at 0.1 s, with -0.25 m/s by their momentum. The table
-    has six digits, and times of four, in rows that are not evenly spaced."""
+    """Carts of 1 kg at 2 m/s and 3 kg at -1 m/s latch at 0.1 s, with -0.25 m/s by their momentum; a table
+    in which they latch at 0.11 s is wrong. It has six decimals, times four, in rows not evenly spaced."""
     carts().save(tmp_path / "carts.toml")
     times = np.sort(np.random.default_rng(1).uniform(0.0, 0.5, 20)).round(4)
     place = np.where(times < latched, 2.0 * times, 2.0 * latched - 0.25 * (times - latched))
@@ -78,14 +78,14 @@ def test_command_judges_a_table_of_carts_that_latch_at_their_common_speed(
 @pytest.mark.slow  # the references take 10 s; carts and ball above are the guard
 @pytest.mark.parametrize("seed", [3, 8, 11])
 def test_motion_of_a_random_mechanism_is_right_in_every_column_that_a_table_can_have(seed):
-    """Joints and couplings hold in intervals. Columns are those of mbref's motion that the judge has."""
+    """Joints and couplings hold in intervals. A body has 19 columns: its pose 7, its four rates 3 each."""
     scene = intermittent_mechanism(seed)
     motion = mbref.simulate(scene, times=np.linspace(0.0, scene.duration, 31))
     found = crosscheck.judge_motion(scene, {"time": motion.times, **motion.columns()})
     assert found.is_right and len(found.columns) > 19 * len(scene.body), found
 
 
-def test_table_of_one_joint_that_does_not_always_hold_has_no_column_of_the_scene():
+def test_table_that_has_only_a_reaction_of_a_latch_is_refused():
     """The latch has no coordinate and no reaction in a table; bodies and other joints have columns."""
     with pytest.raises(mbref.SceneError, match="no column of the scene, such as one"):
         crosscheck.judge_motion(carts(), {"time": np.array([0.0, 0.1]), "L.force.x": np.zeros(2)})

@@ -56,7 +56,7 @@ def test_evenly_spaced_sample_that_rounding_puts_before_an_event_has_the_state_a
 
 def test_pendulum_that_a_second_pivot_catches_keeps_its_angular_momentum_about_this_pivot():
     """I ω + m r × v about the pivot, which is 0.3 m from the rod's centre, with I = m (1 m)² / 12 and m = 2
-    kg. The samples are after the event: their energy is constant."""
+    kg. Its centre then turns about this pivot. The samples are after the event: their energy is constant."""
     second = joint("Q", "spherical", "rod", "ground", (0.8, 0.0, 0.0), active=[[0.3, 2.0]])
     pivots = [*pendulum(0.3).joint, second]
     motion = mbref.simulate(pendulum(0.3, joint=pivots), times=[0.3, 1.0])
@@ -104,7 +104,7 @@ def random_motion() -> Motion:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_every_method_follows_the_motion_through_its_events_as_the_judges_reference(random_motion, method):
+def test_method_of_each_stabilisation_moves_through_events_as_the_judges_reference(random_motion, method):
     """METHODS have one method for each stabilisation, and one of fixed steps. Positions (m) agree with a
     reference by the judge's own equations and events to a tenth of the default tolerance, 1e-9."""
     scene, times = random_motion.mechanism, random_motion.times

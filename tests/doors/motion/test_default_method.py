@@ -1,4 +1,4 @@
-"""The default method is the cheaper one, and follows every motion that `taylor` follows."""
+"""The default method is the faster one of two, and moves large mechanisms as closed forms and as `taylor`."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ SPARSE = "alf-dual+projection/dop853"
         ("strandbeest[30]", SPARSE),
     ],
 )
-def test_default_method_is_sparse_matrices_for_large_mechanisms_of_small_loops_and_else_taylor(name, method):
+def test_default_is_sparse_matrices_for_large_mechanisms_of_small_loops_and_taylor_otherwise(name, method):
     """The table has the faster method of each family of scenes at this size, by `benchmarks/growth.py`; the
     page docs/growth.md has its measurements at similar sizes."""
     assert default_method(find_scene(name)) == method

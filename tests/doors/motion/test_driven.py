@@ -1,4 +1,4 @@
-"""Driven motions by Taylor series: closed forms, over many singular positions and beside some."""
+"""Driven motions by Taylor series: closed forms, over many singular positions and near some."""
 
 import math
 

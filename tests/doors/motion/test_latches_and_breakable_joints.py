@@ -175,7 +175,7 @@ def test_scene_at_carries_whether_the_catch_holds(door_motion, t, later):
     assert np.abs(rest.position[-1] - door_motion.position[-1]).max() <= ROUNDED
 
 
-def test_broken_joint_is_no_part_of_the_scene_after_it():
+def test_broken_joint_is_no_part_of_the_scene_after_the_break():
     """The rope breaks before 0.9 s. The scene at this sample has no joint and continues the fall."""
     motion = mbref.simulate(bob(20.0), "taylor", times=[0.0, 0.9, 1.0])
     fallen = motion.scene_at(0.9)

@@ -27,8 +27,8 @@ METHODS = [
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", SCENES)
-def test_no_method_without_projection_completes_on_another_motion(name, method):
-    """METHODS are formulations with each stabilisation except projection; SCENES cross, turn back before or
+def test_methods_without_projection_do_not_complete_on_another_motion(name, method):
+    """METHODS are 4 formulations with each stabilisation except projection; SCENES cross, turn back from or
     miss a singular position. A run that completes is within the larger of 2000 rtol and 2e-6 of the judge's
     closed form; half of this is the difference from a projected run above which it ends LEFT_MOTION."""
     scene, end = SCENES[name]

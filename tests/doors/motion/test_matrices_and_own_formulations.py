@@ -51,7 +51,7 @@ def test_matrices_of_random_mechanisms_have_the_judges_accelerations(seed):
 )
 def test_jacobian_and_right_hand_sides_are_differences_of_the_constraints(name):
     """Columns of Φ_q = ∂Φ/∂q are differences of Φ. As d/dt (Φ_q v - ν) = Φ_q q̈ - γ, it is -γ along a motion
-    of constant velocities v. The random state violates the constraints. Φ_q is so to CLOSE, γ to ten."""
+    of constant velocities v. The random state violates them. Limits: CLOSE, ten times it for γ."""
     scene = MOTIONS[name]()
     rng, start = np.random.default_rng(5), mbref.terms(scene)
     n = len(start.columns)

@@ -44,7 +44,7 @@ def test_wheel_turns_by_the_periodic_spline_through_the_rows_of_its_driver(durat
 
 
 def test_periodic_table_repeats_beyond_the_duration_in_batches_matrices_and_for_the_judge():
-    """A scene of one period; SciPy's spline gives the angle at 2.5 s, and the judge finds it right."""
+    """SciPy's spline is the truth to 2.5 s, in period 4; the judge finds it right, and Pinocchio has it."""
     scene, angle = driven(PERIOD), EXACT(SAMPLES % PERIOD)
     _, second = simulate_all([scene, scene], "taylor", SAMPLES, mbref.Limits(rtol=1e-12))
     assert second.joint("J").angle == pytest.approx(angle, abs=1e-12)
@@ -55,7 +55,7 @@ def test_periodic_table_repeats_beyond_the_duration_in_batches_matrices_and_for_
     assert rotations.to_vector(run.orientation[:, 0])[:, 2] == pytest.approx(angle, abs=1e-12)
 
 
-def test_table_that_ends_before_the_last_time_is_refused_by_its_line(capsys, tmp_path):
+def test_table_that_ends_before_the_last_time_is_refused_by_its_field(capsys, tmp_path):
     """Beyond its last row, at 0.8 s, a table says nothing: its cubic would go on."""
     scene = driven(PERIOD).with_(driver=[Driver(joint="J", table=TABLE)])
     doors = (

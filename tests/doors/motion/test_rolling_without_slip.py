@@ -83,7 +83,7 @@ def wobbling():
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_leaning_disc_of_the_example_rolls_on_its_circle_by_every_method(method):
+def test_leaning_disc_of_the_example_rolls_on_its_circle_by_five_methods(method):
     """By Newton and Euler, a thin disc whose axis has the cosine c and sine s from the vertical turns
     steadily at Ω if its centre is on a circle of ρ = c (g - r Ω² s / 4) / (3/2 Ω² s); met to ten rtol (m)."""
     motion = mbref.simulate(EXAMPLE, method, times=[0.0, 0.5, 1.0], rtol=1e-10)

@@ -1,4 +1,4 @@
-"""The Taylor method against truths, its options, and scenes without a motion to follow."""
+"""Names and orders of the Taylor method that are read, and those that are refused."""
 
 import pytest
 

@@ -203,9 +203,9 @@ def test_only_a_link_with_three_joints_is_drawn_as_a_plate():
 def test_named_view_has_its_two_world_axes_to_the_right_and_up(name, right, up):
     """The rows of ``axes`` are the directions to the right, up and to the viewer, a right-handed frame."""
     axes = View.parse(name).axes
-    assert np.allclose(axes[0], np.eye(3)["xyz".index(right)])
-    assert np.allclose(axes[1], np.eye(3)["xyz".index(up)])
-    assert np.allclose(axes @ axes.T, np.eye(3)) and np.linalg.det(axes) > 0
+    assert np.allclose(axes[0], np.eye(3)["xyz".index(right)], rtol=0, atol=1e-15)
+    assert np.allclose(axes[1], np.eye(3)["xyz".index(up)], rtol=0, atol=1e-15)
+    assert np.allclose(axes @ axes.T, np.eye(3), rtol=0, atol=1e-15) and np.linalg.det(axes) > 0
 
 
 @pytest.mark.parametrize("text", ["front", "10", "0,91", "nan,0", "a,b"])

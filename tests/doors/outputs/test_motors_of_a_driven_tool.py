@@ -109,7 +109,7 @@ def test_torques_of_the_arm_do_the_virtual_work_that_its_tool_needs(motors):
 
 
 def test_powers_of_motors_are_the_powers_of_the_drivers_that_they_replace():
-    """Three motors share this power as well; motors at the drivers' joints have the drivers' forces."""
+    """Powers are compared as sums, also of three motors; motors at the drivers' joints have their forces."""
     motion = moved()
     drives = [motion.driver(name) for name in ("tool x", "tool y")]
     total = sum(drive.power for drive in drives)

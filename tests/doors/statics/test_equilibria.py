@@ -68,7 +68,7 @@ def test_inverted_pendulum_is_stable_or_unstable_by_a_millionth_of_its_critical_
     each = equilibria(pendulum((0.0, ARM, 0.0), load=[spring(TORQUE * (1 + share))]), starts=1)[0]
     assert each.stability == ("stable" if share > 0 else "unstable")
     # k - m g l is a difference of a millionth: rounding of 1e-12 is relative to it 1e-6, with a margin of 100
-    assert np.allclose(each.eigenvalues**2, -share * TORQUE / ABOUT_HINGE, rtol=1e-4)
+    assert np.allclose(each.eigenvalues**2, -share * TORQUE / ABOUT_HINGE, rtol=1e-4, atol=0)
 
 
 def test_slow_fall_of_a_pendulum_is_found_beside_a_damper_ten_million_times_faster():
@@ -87,9 +87,9 @@ def test_both_equilibria_of_a_pendulum_are_found_beside_springs_of_any_stiffness
     found = equilibria(with_slide(stiffness, 0.0, 0.01))
     assert sorted(each.stability for each in found) == ["stable", "unstable"]
     heights = sorted(each.scene.body[0].position[1] for each in found)
-    assert np.allclose(heights, [-ARM, ARM], atol=1e-10)  # m
+    assert np.allclose(heights, [-ARM, ARM], rtol=0, atol=1e-10)  # m
     slow = [np.sort(np.abs(each.eigenvalues))[:2] for each in found]
-    assert np.allclose(slow, np.sqrt(TORQUE / ABOUT_HINGE), rtol=CLOSE)
+    assert np.allclose(slow, np.sqrt(TORQUE / ABOUT_HINGE), rtol=CLOSE, atol=0)
 
 
 def centres(lengths: np.ndarray, angles: np.ndarray) -> np.ndarray:
