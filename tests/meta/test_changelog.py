@@ -17,7 +17,7 @@ def entries(section: str) -> list[str]:
 
 
 def test_newest_released_section_and_the_citation_are_of_the_version_of_the_packages():
-    """A section Unreleased may stand before it."""
+    """A section Unreleased may stand before the newest released one."""
     released = SECTIONS[1:] if SECTIONS[0].startswith("Unreleased\n") else SECTIONS
     assert released[0].startswith(f"{__version__}\n"), released[0][:20]
     assert f"\nversion: {__version__}\n" in (ROOT / "CITATION.cff").read_text()

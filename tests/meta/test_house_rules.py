@@ -75,7 +75,7 @@ def test_file_has_at_most_330_lines():
 
 
 def test_at_most_60_lines_are_kept_from_the_formatter():
-    """A mark at the end of a statement skips it."""
+    """The mark at the end of a statement keeps the layout of this statement."""
     folders = (*PACKAGES, "tests", "benchmarks", "examples", "docs")
     sources = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
     marked = {name(path): count for path in sources if (count := path.read_text().count("# fmt: " + "skip"))}

@@ -199,7 +199,7 @@ def test_circles_floors_and_upward_imports_of_a_small_graph_are_found():
 
 def test_imports_in_functions_and_for_types_are_arrows_except_for_types_of_a_package(tmp_path):
     """`import a` under TYPE_CHECKING is an arrow from a module. In an `__init__` it only tells type checkers
-    the names that the package offers, so it is none. `import b.c` in a function is an arrow from both."""
+    the names that the package offers: no arrow. `import b.c` in a function is an arrow from both."""
     text = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import a\ndef f():\n    import b.c\n"
     for name, wanted in (
         ("module.py", {"typing", "typing.TYPE_CHECKING", "a", "b.c"}),

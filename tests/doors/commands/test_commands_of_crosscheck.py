@@ -1,4 +1,4 @@
-"""Command line of crosscheck: exit status, standard output and standard error of every command."""
+"""Commands of crosscheck: exit status, standard output and standard error, and reasons of refusals."""
 
 import io
 import json

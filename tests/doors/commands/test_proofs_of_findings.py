@@ -1,4 +1,4 @@
-"""Scripts that prove findings: their number counts, and none outlives the command that runs it."""
+"""Scripts that prove findings: the last number that they print decides whether the error is present."""
 
 from typing import Any
 

@@ -101,7 +101,7 @@ def test_runs_whose_loops_crosscheck_closes_have_a_row_of_their_own() -> None:
     assert rows["drake, terms"]["four-bar"].best() is by_crosscheck
 
 
-def test_new_record_replaces_its_run_an_older_version_or_a_refusal() -> None:
+def test_new_record_replaces_the_same_run_runs_of_an_older_version_and_a_refusal() -> None:
     """The new record is a run by MuJoCo 4.0.0 on the first mechanism, or MuJoCo's refusal of it. A table has
     one version of an engine, and either runs or a refusal for a mechanism."""
     new = measured(1e-9)

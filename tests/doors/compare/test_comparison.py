@@ -127,7 +127,7 @@ def test_a_quick_comparison_runs_mbref_at_its_default_method():
 
 
 def test_two_engines_of_one_name_are_refused():
-    """Records of both engines would be of one: runs of the other engine would be judged as its own."""
+    """Records have an engine's name alone: runs of one engine would be judged as the other's."""
     with pytest.raises(RequestError, match="both have the name 'fake'"):
         crosscheck.compare(BLOCK, [f"{FAKES}:FAKE", f"{FAKES}:KEEPING"])
 

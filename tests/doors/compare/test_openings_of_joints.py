@@ -42,7 +42,7 @@ def displaced(scene: Scene, moved: np.ndarray, turned: np.ndarray) -> Trajectory
 @pytest.mark.parametrize("seed", range(4))
 def test_opening_has_the_distance_of_the_joints_points_and_the_tilt_of_its_axis(size: float, seed: int):
     """An arm whose hinge turns about z is tilted about x through the hinge's anchor, and shifted by a random
-    vector. Rounding of the arms is below 1e-9 of both."""
+    vector. Rounding of the arms is below 1e-9 of the shift and of the tilt."""
     random = np.random.default_rng(seed)
     moved, tilt = 0.01 * size * random.normal(size=3), random.uniform(0.1, 1.0)
     found = opening(arms(size), displaced(arms(size), moved, np.array([tilt, 0.0, 0.0])))

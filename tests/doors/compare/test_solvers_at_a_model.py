@@ -17,7 +17,7 @@ SEVERAL = "tests.helpers.falling_engine:SEVERAL"
 
 
 def test_way_with_too_much_gravity_is_named_beside_the_way_that_gauss_principle_supports():
-    """A stone falls with g or with 1.5 g: they differ by a third of the larger. Gauss gives g."""
+    """A stone falls with g or with 1.5 g: they differ by a third of the larger. Gauss's principle gives g."""
     (found,) = disagreements(STONE, [SEVERAL])
     assert found.apart == pytest.approx(1 / 3, rel=1e-12) and found.ways == ("light", "heavy")
     assert "in acceleration of 'stone'; Gauss's principle supports 'light'" in found.sentence

@@ -30,7 +30,7 @@ def case(family: str, fake: str = "FAKE", scene: Scene | None = None, limit: flo
 
 
 def test_record_of_a_study_holds_the_engine_s_trajectory():
-    """Read back from JSON it is the trajectory of a run here; the record also identifies case and machine."""
+    """Read back from JSON the record is the trajectory of a run here. Case and machine are in it, too."""
     wanted = case("a")
     [record] = study([wanted], ThreadPoolExecutor(1))
     there = Trajectory.from_record("still", json.loads(json.dumps(record)))
@@ -70,7 +70,7 @@ def test_second_study_runs_only_cases_that_are_not_stored(tmp_path: Path):
 
 
 def test_interrupted_study_stores_the_runs_that_have_ended(tmp_path: Path):
-    """After the first run its progress callback raises KeyboardInterrupt, while another run hangs."""
+    """After the first run the study's callback raises KeyboardInterrupt, while another run hangs."""
     path = tmp_path / "records.jsonl"
 
     def interrupt(done: int, total: int, record: dict) -> None:

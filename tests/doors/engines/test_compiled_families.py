@@ -98,7 +98,8 @@ def test_an_integration_ends_when_its_largest_number_of_steps_is_reached() -> No
 
 @pytest.mark.parametrize("shortest", [1e-12, 1e-3])
 def test_an_integration_ends_where_its_solution_becomes_infinite(shortest: float) -> None:
-    """y' = y² from y = 1 is 1 / (1 - t): 2 at 0.5 s, infinite at 1 s; the last step may pass this."""
+    """y' = y² from y = 1 is 1 / (1 - t): 2 at 0.5 s, infinite at 1 s. The last step may pass this time by the
+    shortest step, or by 1e-6 s, 100 tolerances in seconds; 6e-10 s and 3e-4 s are measured."""
     with np.errstate(over="ignore"):
         found = integrate(lambda _, y: y**2, [1.0], [0.5, 2.0], 1e-8, shortest=shortest)
         status, reached, samples, memory = found
@@ -272,7 +273,7 @@ def test_newton_refuses_a_scene_whose_motion_is_not_prescribed() -> None:
         simulate("mujoco", SCENES["planar_slider_crank"](), 5, NEWTON, tolerance=1e-10, turn=0.1)
 
 
-def test_planar_scene_leaves_a_mechanism_that_can_leave_its_plane_unchanged() -> None:
+def test_planar_scene_replaces_joints_only_if_the_mechanism_cannot_leave_its_plane() -> None:
     """The four-bar cannot leave its plane, and gets hinges in place of universal joints. A double pendulum on
     a hinge and a ball joint can, at rest and with a spin about y."""
     scene = SCENES["four_bar_gravity"]()

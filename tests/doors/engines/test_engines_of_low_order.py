@@ -43,7 +43,7 @@ def test_fault_in_an_engine_of_low_order_violates_a_check_on_the_scene_that_show
 
 
 @pytest.mark.parametrize("step", [euler, midpoint])
-def test_free_fall_by_low_order_violates_no_check_but_does_with_twice_the_gravity(step: Step):
-    """The steps of both methods are accurate enough for a free body; the planted fault is none of theirs."""
+def test_free_fall_by_steps_of_low_order_violates_a_check_only_with_twice_the_gravity(step: Step):
+    """Errors of the steps of Euler's and of the midpoint method are no faults; twice the gravity is one."""
     assert failures(step, ["free_fall"]) == []
     assert failures(step, ["free_fall"], "gravity acts twice")

@@ -152,14 +152,14 @@ FORCED = [(way, name) for way, name in CASES if way not in NO_DRIVEN_FORCES or n
 def test_first_sample_has_the_judges_velocities_and_accelerations_of_gauss_s_principle(way, name) -> None:
     """The judge's velocities minimise the kinetic energy where the scene leaves them open. WAYS states the
     allowed difference over the largest velocity or acceleration, or over 1 (m/s, rad/s and per s)."""
-    for fields in (FIELDS[:2], FIELDS[2:])[: 1 + ((way, name) in FORCED)]:
+    for fields in (FIELDS[:2], FIELDS[2:]) if (way, name) in FORCED else (FIELDS[:2],):
         assert largest_difference(short_run(way, name), name, fields) < WAYS[way][1], fields
 
 
 @pytest.mark.parametrize(("way", "name"), FORCED)
 def test_first_sample_of_an_engine_has_the_reactions_that_balance_every_body(way: str, name: str) -> None:
     """The exact reactions follow from Newton's and Euler's equations of each body. WAYS states the allowed
-    difference, relative to the largest reaction. Of components that redundant rows leave open sums count."""
+    difference over the largest reaction; where redundant rows leave reactions open, bodies' resultants."""
     compared = compare(SCENES[name], exact_start(SCENES[name]), first(short_run(way, name)))
     off = [compared.resultant, *(reaction.unique for reaction in compared.joints.values())]
     assert all(each < WAYS[way][1] for each in off), off

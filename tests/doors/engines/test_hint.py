@@ -129,7 +129,7 @@ class Geared(type(engine("mbref"))):
         (("coupling",), "gear pair", "look at the constraints: coupling 'teeth' left out"),
     ],
 )
-def test_hint_knows_armatures_and_couplings(defect, scene, says):
+def test_hint_names_a_wrong_armature_or_coupling_and_none_for_a_wrong_output(defect, scene, says):
     """`Geared` has the ``defect``. Positions that are given 0.1 mm aside leave accelerations right."""
     found = hint(InProcess(Geared(*defect), "mbref"), [Failure(KNOWN[scene], "truth")])
     assert says in found, found

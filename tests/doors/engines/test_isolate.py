@@ -98,7 +98,7 @@ def test_output_and_files_of_an_engine_do_not_reach_the_parent_process(capfd, tm
 
 
 def test_a_child_computes_with_one_thread(monkeypatch: pytest.MonkeyPatch):
-    """Two threads are asked for. THREADS gives OpenBLAS' and OpenMP's numbers as its version."""
+    """The environment asks for two. THREADS gives OpenBLAS' and OpenMP's numbers, 1 and 1, as its version."""
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
     assert run("THREADS").version == "11"
@@ -217,7 +217,7 @@ def untimed(ended: Trajectory) -> str:
 
 
 def test_stop_all_kills_a_running_child_and_its_run_is_crashed(tmp_path: Path):
-    """The engine HANG writes a number into a file when it runs, and sleeps; then ``stop_all`` is called."""
+    """HANG writes its process's number into a file when it runs, and sleeps; then ``stop_all`` is called."""
     pid = tmp_path / "pid"
     with ThreadPoolExecutor(1) as pool:
         future = pool.submit(run, "HANG", still(str(pid)))
@@ -248,7 +248,7 @@ def test_interleaved_runs_take_turns_in_one_process_after_one_untimed_round(tmp_
 
 
 def test_setting_a_hundred_times_behind_the_fastest_is_timed_once(tmp_path: Path):
-    """Of three repeats: 0.5 s is 500 times the fastest's 0.001 s, and 0.09 s is 90 times."""
+    """Three repeats are asked for. 0.5 s is 500 times the fastest's 0.001 s; 0.09 s is only 90 times."""
     costs = {"slow": 0.5, "fast": 0.001, "near": 0.09}  # s
     jobs = [(f"{FAKES}:RECORDER", Setting(name, {"seconds": s})) for name, s in costs.items()]
     seconds = time_interleaved(still(str(tmp_path / "log")), TIMES, jobs, repeats=3, time_limit=60.0)

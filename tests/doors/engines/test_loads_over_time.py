@@ -68,7 +68,7 @@ CASES += [(of, OVER_TIME) for of in ("exudyn", "drake", "dart")]
 def test_engine_moves_loads_of_joints_and_over_time_as_the_reference(of, name):
     """The scene is a body on a joint with this load for 0.1 s. Loads over time have a polynomial, sine, table
     or switch as factor. Positions (m), and accelerations over the largest or over 1 m/s², differ from the
-    reference by at most ten times MEASURED. Of Drake and DART crosscheck integrates the accelerations."""
+    reference by at most ten times MEASURED. Drake's and DART's accelerations are integrated by crosscheck."""
     pytest.importorskip({"drake": "pydrake", "dart": "dartpy"}.get(of, of))
     scene, times, simulator = PROBES[name].with_(duration=0.1), np.linspace(0.0, 0.1, 4), engine(of)
     run = simulator.run(scene, times, simulator.best_settings(scene)[-1])

@@ -35,7 +35,7 @@ ERRORS = {
     "xpbd": 8.4e-3,
     "semi-implicit": 7.8e-3,
 }
-MARGIN = 1.5  # on the measured errors, which are errors of the method and not of rounding
+CLOSE = 1.5  # times the measured errors, which are errors of the method and not of rounding
 SINGLE = 1e-6  # some roundings of Newton's single precision, 6e-8
 
 
@@ -78,7 +78,7 @@ def test_solvers_that_need_a_constraint_do_not_serve_a_free_body():
 @pytest.mark.parametrize(("family", "measured"), ERRORS.items())
 def test_newton_s_solver_moves_a_four_bar_within_its_measured_error(family, measured):
     """Errors in 0.2 s with steps of 1 ms, over the length, are at most 1.5 times the measured ones."""
-    assert 0 < error_of_four_bar(family) < MARGIN * measured
+    assert 0 < error_of_four_bar(family) < CLOSE * measured
 
 
 @INSTALLED

@@ -131,7 +131,7 @@ REFUSED = {"bullet": set(), "mjx": DRIVEN, "warp": DRIVEN, "newton": DRIVEN | OF
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STEPPERS)
-def test_engines_with_own_steps_move_every_pair(name):
+def test_engines_with_own_steps_move_by_both_parts_of_every_pair_that_they_accept(name):
     """All pairs but REFUSED are in one scene. Errors are below a tenth of the effect of losing a part."""
     if not installed(name):
         pytest.skip(f"{name} is not installed")

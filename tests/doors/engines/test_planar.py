@@ -150,7 +150,7 @@ def test_swash_plate_lifts_a_pin_as_its_closed_form(name: str, bodies: tuple[str
 
 
 def test_ondsel_s_accelerations_of_a_plane_between_moving_bodies_are_left_out() -> None:
-    """OndselSolver computes wrong accelerations there. On a plane of the ground a slider-crank has them."""
+    """OndselSolver's values are wrong there, and left out; with a plane of the ground they are given."""
     scene, _ = swash_plate(("plate", "pin"))
     grounded = guided()[1]
     driven = grounded.with_(body=at_rest(grounded), driver=(Driver(joint="A", polynomial=(0.0, 30.0)),))
@@ -170,7 +170,7 @@ def referred(scene: Scene) -> Reference:
 @pytest.mark.parametrize("joints", [1, 2])
 @pytest.mark.parametrize("bodies", ORDERS, ids="-".join)
 def test_reference_of_a_block_on_an_incline_is_the_closed_form(bodies: tuple[str, str], joints: int) -> None:
-    """To the stated bound, at most 1e-12, also where a second joint closes a loop of formulation B's tree."""
+    """Off by at most its bound, up to 1e-12, also where a second joint closes a loop of formulation B."""
     found, (position, orientation) = referred(incline(bodies, joints)), exact_poses()
     allowed = found.bound.max()
     assert np.abs(found.position[:, 0] - position).max() <= allowed

@@ -63,10 +63,7 @@ def test_port_and_mujoco_in_c_stay_within_their_measured_errors(name: str) -> No
 
 # measured differences of runs in single and in double precision over 0.2 s, at steps of 1 ms
 APART = {"four_bar_free": {"mjx": 1.5e-6, "warp": 5.9e-7}, "bennett": {"mjx": 9.8e-8, "warp": 2.5e-7}}
-SINGLE = {
-    "mjx": ("mjx", "stock, single"),
-    "warp": ("mujoco", "stock"),
-}  # the port, or MuJoCo in C, to compare
+OTHER = {"mjx": ("mjx", "stock, single"), "warp": ("mujoco", "stock")}  # a way in the other precision
 
 
 @pytest.mark.slow
@@ -80,7 +77,7 @@ def test_single_and_double_precision_differ_by_rounding(name: str, mechanism: st
         pytest.skip(f"{name} is not installed")
     column = next(column for column in DIFFICULTIES if column.scene == mechanism)
     scene, times = column.make().with_(duration=0.2), np.array([0.0, 0.1, 0.2])
-    pair, step = ((name, "stock"), SINGLE[name]), {"step": 1e-3}
+    pair, step = ((name, "stock"), OTHER[name]), {"step": 1e-3}
     runs = [engine(simulator).run(scene, times, Setting(family, step)) for simulator, family in pair]
     difference = float(error_series(scene, *runs).max())
     assert 1e-9 < difference < MARGIN * APART[mechanism][name], f"{difference:.1e} apart"
@@ -107,7 +104,7 @@ def apart(one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarra
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["mujoco", *PORTS])
-def test_port_moves_loads_couplings_and_armatures_as_the_reference(name: str) -> None:
+def test_mujoco_and_its_ports_move_loads_couplings_and_armatures_as_the_reference(name: str) -> None:
     """Every body's error is below 1e-3 of the effect that its loads, couplings and armatures have on it, by
     the reference with and without them. A lost part leaves 1, a wrong ratio its relative error; single
     precision and the stiffness of couplings leave 3e-5."""

@@ -55,15 +55,15 @@ LOADED = range(4, 40, 5)  # seeds of mechanisms with loads of joints and over ti
 
 
 def test_random_scenes_have_every_load_type_and_functions_of_time():
-    """Seeds 4, 9, 14, … have loads of joints, two of them on one joint, and loads times a polynomial and
+    """Seeds 4, 9, 14, … have loads of joints, in each two on one joint, and loads times a polynomial and
     sine; seeds 0 to 3 have none over time."""
     scenes = [random_scenes.mechanism(seed) for seed in LOADED]
     loads = [load for scene in scenes for load in scene.load]
     assert {load.type for load in loads} == set(LOAD_TYPES)
     timed = {load.type for load in loads if load.over_time}
     assert timed == {"force", "moment", "joint_torque", "joint_force"}
-    pairs = [load.joint for scene in scenes[:1] for load in scene.load if load.acts_on == "joint"]
-    assert len(pairs) > len(set(pairs)), "no joint has two loads"
+    joints = [[load.joint for load in scene.load if load.acts_on == "joint"] for scene in scenes]
+    assert all(len(names) > len(set(names)) for names in joints), "no joint has two loads"
     assert all(load.factor.polynomial and load.factor.sine for load in loads if load.over_time)
     assert not any(load.over_time for seed in range(4) for load in random_scenes.mechanism(seed).load)
 

@@ -38,7 +38,7 @@ def test_ida_stays_within_its_measured_error_of_the_truth(name, duration, measur
 
 
 def test_tolerance_of_a_hundredth_reduces_ida_s_error_fivefold() -> None:
-    """Without effect, tolerances of 1e-4, 1e-6 and 1e-8 give one error; in proportion, 100 times less."""
+    """A tolerance without effect would leave the error, a proportional one a hundredth; 1/5 is between."""
     scene = SCENES["spatial_slider_crank"]()
     errors = [completed_error(simulate(scene, 0.01, rtol), scene) for rtol in (1e-4, 1e-6, 1e-8)]
     assert errors[1] < errors[0] / 5 and errors[2] < errors[1] / 5

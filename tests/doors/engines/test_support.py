@@ -69,7 +69,7 @@ def test_every_feature_that_an_engine_does_not_refuse_starts_by_gauss_s_principl
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn", "dart"])
 def test_engines_that_map_massless_links_move_them_as_a_universal_joint(name):
     """Two hinges on a link without mass are a universal joint. The engine's best setting moves the body, by
-    up to 0.1 m, within 1e-6 m of the judge's reference with such a joint; measured are 2e-13 m."""
+    up to 0.1 m, as the judge's reference with such a joint, to ten times the measured 2e-13 m."""
     pytest.importorskip({"dart": "dartpy"}.get(name, name))
     scene, simulator = massless_link(), engine(name)
     joint = Universal(name="U", bodies=("ground", "body"), anchor=PIVOT, axes=PLACES["axes"])
@@ -79,7 +79,7 @@ def test_engines_that_map_massless_links_move_them_as_a_universal_joint(name):
     run = simulator.run(scene, times, simulator.best_settings(scene)[-1])
     exact = natural_motion(whole, times, EXTENDED, seconds=20.0).position
     assert run.outcome is Outcome.COMPLETED, run.message
-    assert np.abs(run["body"].position - doubles(exact)[:, 0]).max() < 1e-6, run.message
+    assert np.abs(run["body"].position - doubles(exact)[:, 0]).max() < MARGIN * 2e-13, run.message
 
 
 def test_unsupported_feature_gets_a_numbered_note_with_its_cause():

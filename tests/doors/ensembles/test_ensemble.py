@@ -158,7 +158,7 @@ def test_command_refuses_a_number_that_cannot_vary(text: str, says: str, capsys:
 
 
 def test_command_prints_mean_and_deviation_of_single_runs(tmp_path: Path, capsys: pytest.CaptureFixture):
-    """They are NumPy's mean and standard deviation of four runs, to rounding; --out has a line for each."""
+    """The truth is NumPy's mean and deviation of four single runs, to rounding; --out has a line for each."""
     path = tmp_path / "runs.jsonl"
     words = "ensemble spatial_slider_crank_driven --vary joint[B].anchor[0]=0.1+-1e-3 --count 4 --times 0.01"
     command = [*words.split(), "--rtol", "1e-8", "--workers", "1", "--out", str(path)]

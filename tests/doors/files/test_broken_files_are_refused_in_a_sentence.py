@@ -68,7 +68,7 @@ def test_a_file_that_is_no_xml_is_refused_by_the_reader_of_its_format(files, nam
     [("a.xml", "has no body"), ("a.urdf", "MuJoCo cannot read it: "), ("a.sdf", "has no model")],
 )
 def test_an_empty_mjcf_model_is_refused_under_the_suffix_of_each_format(files, name, says):
-    """MuJoCo reads MJCF also from .urdf files: both have no body to offer."""
+    """The suffix chooses the reader: the root <mujoco> is right in .xml only, and there it has no body."""
     assert says in files.refusal(b"<mujoco/>", name)
 
 

@@ -104,7 +104,7 @@ BESIDE = {
 @pytest.mark.parametrize(("name", "content", "says"), BESIDE.values(), ids=BESIDE)
 def test_faulty_file_beside_right_records_is_named_with_its_fault(name, content, says, tmp_path, capsys):
     """BESIDE has the name and the content of the file, and words of the fault. LACKING is a line with only a
-    key and a scene; other contents are no JSON."""
+    key and a scene, UNMOVED a truth without the motion of its bodies; other contents are no JSON."""
     place = folder(tmp_path / "r", record_with("seed", 0))
     (place / name).parent.mkdir(exist_ok=True)
     (place / name).write_bytes(content)

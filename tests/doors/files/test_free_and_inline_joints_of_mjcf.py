@@ -49,8 +49,8 @@ def test_a_coupling_of_an_inline_joint_moves_its_point_along_its_line(bodies):
 
 
 def test_a_slide_behind_a_ball_joint_of_one_body_is_imported_with_its_spring(tmp_path):
-    """A massless link stands between both joints. The import refuses a scene that disagrees with MuJoCo's
-    bias forces, from which ``mj_jacDot`` differs here, as it is not the rate of the Jacobian."""
+    """In the scene a massless link stands between both joints. The import compares velocity terms with
+    MuJoCo's bias forces; by ``mj_jacDot``, which is wrong here, it would refuse the scene."""
     text = """<mujoco><worldbody><body name="leg"><joint name="hip" type="ball"/>
     <joint name="shin" type="slide" axis="0 0 1" stiffness="50" springref="0.1"/>
     <inertial mass="2" pos="0.1 0.2 -0.4" diaginertia="0.3 0.4 0.5"/></body></worldbody></mujoco>"""

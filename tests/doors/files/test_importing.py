@@ -156,7 +156,7 @@ def open_chain() -> str:
 
 
 def test_note_names_frames_of_two_branches_that_coincide(tmp_path):
-    """Such frames may be the ends of a loop, which URDF cannot close."""
+    """Frames that coincide may be the ends of a loop, which URDF cannot close."""
     notes = read(tmp_path, open_chain(), "open.urdf").imported.notes
     assert any("'end_a' (on 'two') and 'end_b' (on 'three') coincide" in note for note in notes)
 

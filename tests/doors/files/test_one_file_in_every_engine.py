@@ -174,8 +174,8 @@ def carried_by(joint: str) -> str:
     return text.replace("<worldbody>", '<option gravity="1 2 -9"/><worldbody>')
 
 
-DAMPED = HINGE.replace("/>", ' damping="0.2"/>')
-TREES = {"tree": DAMPED, "ball": '<joint type="ball"/>', "free": "<freejoint/>"}
+DAMPED_HINGE = HINGE.replace("/>", ' damping="0.2"/>')
+TREES = {"tree": DAMPED_HINGE, "ball": '<joint type="ball"/>', "free": "<freejoint/>"}
 
 
 DAMPED = {  # trees, also with a ball and a free joint, a loop and a coupling, each with dampers

@@ -38,7 +38,7 @@ def full_disk(size: int) -> Iterator[None]:
 
 @pytest.mark.parametrize("command", WRITERS)
 def test_file_that_exists_is_replaced_only_with_force(command, tmp_path, capsys):
-    """Without --force it returns 2, names the file and the option in one line, and writes nothing."""
+    """Without --force a command returns 2, names the file and the option in one line, and writes nothing."""
     out = tmp_path / f"out{SUFFIX.get(command, '.toml')}"
     out.write_text("my own")
     assert main([*WRITERS[command], str(out)]) == 2

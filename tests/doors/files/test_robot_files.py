@@ -1,4 +1,4 @@
-"""Robot files, and random ones: the scene's motion / MuJoCo's matrices of the original, integrated finely.
+"""Scenes of robot files, and of random ones, move as MuJoCo's matrices of the file, integrated finely.
 The motion of the scene is the judge's, by Gauss's principle. Loops and mimic joints that MuJoCo does not read
 from a URDF are added to its model here, by MjSpec."""
 

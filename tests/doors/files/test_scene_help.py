@@ -12,9 +12,12 @@ from crosscheck.conformance.changes.units import in_other_units
 from mbref.cli import main
 from mbref.cli.output import Lines
 from mbref.cli.scene_files import schema, template
+from mbref.formulations import FORMULATIONS
+from mbref.integrators import INTEGRATORS
 from mbref.scene import Revolute, Scene, SceneError
 from mbref.scene.slips import probable_slips
 from mbref.scenes import SCENES, find_scene
+from mbref.stabilisation import STABILISATIONS
 
 
 def faults(tmp_path: Path, *changes: tuple[str, str]) -> list[str]:
@@ -357,11 +360,11 @@ def test_command_animate_states_why_there_are_no_branches(words, says, tmp_path,
 
 
 def test_command_list_prints_every_name_within_eighty_columns(capsys):
-    """Names of scenes, a formulation, a stabilisation and an integrator; at most 80 characters a line."""
+    """Names of all scenes, formulations, stabilisations and integrators; at most 80 characters a line."""
     assert main(["list"]) == 0
     out = capsys.readouterr().out
-    assert max(map(len, out.splitlines())) <= 80 and all(name in out for name in SCENES)
-    assert all(f"{name} " in out for name in ("mpi-gs-literal", "baumgarte", "dop853"))
+    names = (*SCENES, *FORMULATIONS, *STABILISATIONS, *INTEGRATORS)
+    assert max(map(len, out.splitlines())) <= 80 and all(f"{name} " in out for name in names)
 
 
 def test_progress_in_a_pipe_prints_at_most_a_line_in_ten_seconds(capsys):

@@ -210,7 +210,7 @@ def test_sdf_with_parts_beside_its_world_is_refused_with_their_names(beside, say
     for text in (world + beside, beside + world):
         with pytest.raises(SceneError, match="beside world") as caught:
             read(tmp_path, f"<sdf version='1.7'>{text}</sdf>")
-    assert says in str(caught.value) or "has world 'w' beside world 'v'" in str(caught.value)
+        assert says in str(caught.value) or "has world 'w' beside world 'v'" in str(caught.value)
 
 
 def test_keyframe_of_an_sdf_file_is_refused(tmp_path):

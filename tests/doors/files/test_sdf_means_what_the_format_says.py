@@ -61,7 +61,7 @@ def test_an_axis_is_in_the_frame_of_the_model_by_the_rule_of_its_version(files, 
     arm = link("arm", f"0.5 0 0 0 0 {math.pi / 2!r}")
     shoulder = joint("shoulder", "revolute", "world", "arm", "1 0 0", inside=given)
     scene, notes = files.scene(sdf(arm, shoulder, version=version), "arm.sdf")
-    assert scene.joint_named("shoulder").axis == pytest.approx(axis, abs=1e-14)  # of π/2
+    assert scene.joint_named("shoulder").axis == pytest.approx(axis, abs=1e-14)  # π/2 is rounded
     assert ("<use_parent_model_frame> of an axis: is not read" in notes) == (version == "1.9")
 
 

@@ -211,7 +211,7 @@ def test_damaged_code_of_a_kernel_is_removed_whatever_the_time_of_its_file(ahead
 @USERS
 @pytest.mark.parametrize("place", ["root", "version", "kernels"])
 def test_kernels_are_not_used_from_a_cache_in_which_others_can_write(place, tmp_path: Path, capsys):
-    """One of its three levels of folders has the mode 0777; others can reach all of them."""
+    """One of the cache's three levels of folders has the mode 0777; other users can reach all of them."""
     version = tmp_path / "cache" / "version"
     levels = {"root": version.parent, "version": version, "kernels": kernel_of(version).parent}
     for folder in (tmp_path, *levels.values()):
