@@ -111,8 +111,8 @@ def test_velocities_and_accelerations_of_the_files_model_are_differences_of_its_
 
 def test_stiff_closures_and_small_steps_together_reach_the_motion_of_exact_joints(tmp_path):
     """Errors of positions (m) after 0.05 s by Gauss's principle with exact joints: 8e-3 as in the file, 6e-4
-    with smaller steps, whose closures are soft, and 4e-10 with stiff closures and RK4 too (measured). Both
-    limits have a wide margin, as other processors and versions of MuJoCo change these errors."""
+    with smaller steps, whose closures are soft, and 4e-10 with stiff closures and RK4 too (measured). Limits
+    are wide, over 1e-4 and under 1e-7, as other processors and versions of MuJoCo change these errors."""
     scene, times = imported(tmp_path, FOUR_BAR, TILTED), np.array([0.0, 0.05])
     true = gauss_motion(scene, tuple(times.tolist())).position
     off = {

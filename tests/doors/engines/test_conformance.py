@@ -64,8 +64,8 @@ def test_verify_fails_an_engine_that_prints_and_rests_where_a_body_falls(capsys)
 
 
 def test_an_endless_run_in_this_process_times_out_and_leaves_no_timer():
-    """The engine loops for ever and catches every Exception. It ends after its 0.1 s, and the next run, of
-    another scene, completes within its own 0.1 s."""
+    """The engine loops for ever and catches every Exception. Its run ends after 0.1 s, and the next run, of
+    another scene, completes within a limit of 0.1 s of its own."""
 
     class Endless(Fake):
         def act(self, scene):
@@ -85,8 +85,8 @@ def test_an_endless_run_in_this_process_times_out_and_leaves_no_timer():
 
 @pytest.mark.parametrize(("fake", "status"), [("FAKE", "pass"), ("AGING", "fail"), ("KEEPING", "fail")])
 def test_check_repeated_fails_only_engines_whose_runs_depend_on_earlier_runs(fake, status):
-    """AGING moves bodies by 1e-14 m more in every run of a process, KEEPING by the first run's mass. FAKE
-    does not. A new process repeats the first run of each, so that the check `reordered` passes."""
+    """AGING moves bodies by 1e-14 m more in every run of a process, KEEPING by 1e-14 m for a kg of the first
+    run, and FAKE not. A new process repeats the first run, so that the check `reordered` passes."""
     bench = trial.set_up(Isolated(f"{FAKES}:{fake}", 60.0), SPECIMENS["pendulum"])
     repeated, reordered = (suite.verdict_on(check, bench) for check in ("repeated", "reordered"))
     assert repeated.status == status, repeated

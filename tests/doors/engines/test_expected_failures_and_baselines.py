@@ -145,7 +145,7 @@ def test_damaged_baseline_is_refused_with_its_fault(wrong, verdicts, said, tmp_p
         read_baseline(tmp_path / "damaged.json")
 
 
-def test_scenes_after_the_time_budget_are_named_and_conform_to_nothing():
+def test_scenes_after_the_time_budget_are_named_and_show_no_conformance():
     """The budget is 0 s, so that the free fall, the only scene, is left out."""
     found = verify(budget=0.0)
     assert "free_fall" in found.left_out and not found.verdicts and not found.conforms

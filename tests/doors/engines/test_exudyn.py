@@ -76,8 +76,8 @@ def test_exudyns_families_move_mechanisms_within_their_measured_errors(name, dur
 
 
 def test_exudyns_trapezoidal_rule_has_order_two_and_extrapolation_more_than_five():
-    """The order is the binary logarithm of the ratio of errors at 2 and 1 ms. The rule's error has only even
-    powers of the step; extrapolation removes two, which leaves order six (5.7 is measured)."""
+    """Orders are binary logarithms of ratios of errors at 2 and 1 ms: the rule's is 2 within 0.1. Its error
+    has even powers of the step; extrapolation removes two, which leaves order six (5.7 is measured)."""
     scene = SCENES["spatial_slider_crank_gravity"]()
     times, truth = np.linspace(0, 0.1, 6), truth_for(scene)
     errors = {

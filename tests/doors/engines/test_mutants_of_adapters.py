@@ -142,8 +142,8 @@ def test_each_text_that_a_defect_replaces_is_once_in_its_file():
 @pytest.mark.parametrize(("way", "defect"), CASES)
 def test_planted_defect_moves_an_adapter_off_the_reference(way, defect, monkeypatch, tmp_path):
     """One replaced text of the adapter makes the run fail, or puts poses off the judge's reference by more
-    than the engine's limit in WAYS, or velocities or reactions by more than 100 times this limit. Without it
-    all are within these limits."""
+    than the engine's limit in WAYS, or velocities or reactions by more than 100 times this limit. Without
+    the defect all are within these limits."""
     if not installed(package(way)):
         pytest.skip(f"{package(way)} is not installed")
     monkeypatch.syspath_prepend(str(tmp_path))

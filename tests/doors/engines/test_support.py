@@ -38,7 +38,7 @@ def test_probes_have_every_type_of_joint_load_and_driver():
 
 @pytest.mark.parametrize(("name", "is_redundant"), [("loop", False), ("redundant loop", True)])
 def test_probe_of_a_loop_has_redundant_rows_if_its_name_says_so(name, is_redundant):
-    """The rank of the judge's constraint matrix decides."""
+    """The judge's constraint matrix decides; its rank counts singular values above 1e-9 of the largest."""
     scene = feature_scenes()[name]
     rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
     assert (np.linalg.matrix_rank(rows, rtol=1e-9) < len(rows)) == is_redundant

@@ -127,8 +127,8 @@ def two_cranks(size: float, tilt: float = 0.0, rod: float = 1.1) -> str:
 
 def test_an_open_loop_is_closed_alike_at_every_size(files):
     """The first crank, of length s, keeps the given angle of 0.6 rad: its middle is at s / 2 (-sin, cos). The
-    search ends at errors of 1e-9 s. Those of the other places, which are proportional to s, may be ten times
-    as large. One degree of freedom remains."""
+    search ends at errors of 1e-9 of the length s. All places over s are equal at every size, to ten times
+    this error. One degree of freedom remains."""
     found = []
     for size in (1e-4, 1e-2, 1.0, 1e2, 1e5):
         scene, out = files.scene(two_cranks(size), "a.xml", "--pose", "ja=0.6")

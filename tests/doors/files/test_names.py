@@ -46,7 +46,7 @@ def named(name: str) -> Scene:
 
 def test_file_names_of_different_names_differ_and_are_safe_words_of_a_shell(tmp_path):
     """A word is safe if `shlex.quote` leaves it as it is, except for ü, which it quotes and shells need not.
-    The file name of a plain name, "four_bar-2", is the name itself."""
+    The file name of a plain name, "four_bar-2", is the name itself. None has 100 bytes."""
     found = {file_name(name) for name in NAMES}
     assert len(found) == len(NAMES) and file_name("four_bar-2") == "four_bar-2"
     for name in found:

@@ -73,7 +73,7 @@ def gears(parent: str = "one", child: str = "two", sense: int = 1, swapped: bool
 def test_gearbox_turns_its_child_by_minus_ratio_times_the_parent(sense, swapped, tmp_path):
     """SDF defines θ₂ = -ratio · θ₁: θ₁ is the angle from the reference body to the parent about ``axis``, and
     θ₂ to the child about ``axis2``, whatever the senses of the hinges are. From rest angular accelerations by
-    Gauss's principle have the same ratio, here -3."""
+    Gauss's principle have this ratio, here -3, to 1e-9."""
     scene = read(tmp_path, gears(sense=sense, swapped=swapped)).scene
     spins = gauss(scene)[len(scene.body) :, 1]  # about y, of the frame and both wheels
     of_parent, of_child = spins[1] - spins[0], sense * (spins[2] - spins[0])
