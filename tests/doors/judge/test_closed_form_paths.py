@@ -149,7 +149,7 @@ def test_only_a_driver_of_the_crank_prescribes_the_path_of_a_spatial_slider_cran
 @of_cranks
 def test_derivatives_of_a_spatial_slider_cranks_path_equal_finite_differences(line, order, reverse, way, q):
     """Differences of fourth order over h = 1e-4 rad in long doubles are exact to about h⁴ = 1e-16 times the
-    fifth derivative; 1e-8 also allows for the steepest path."""
+    fifth derivative; 1e-8 also allows for the steepest path: 8e-10 is measured."""
     path, h = spatial_slider_crank(spatial(line, order, reverse, way)), 1e-4
     pose = path.poses((q + h * np.arange(-2, 3)).astype(np.longdouble))
     weights = np.array([1, -8, 0, 8, -1]) / (12 * h)

@@ -18,7 +18,6 @@ from mbref.scenes.four_bar_chain import four_bar_chain
 LIMIT = 1.0  # s
 ALLOWED = 2 * LIMIT + 2.0  # s of CPU time: twice the limit, and 2 s for the set-up, which has no limit
 
-
 HARD = {  # scenes whose reference takes more than 1 s, and end (s)
     # anchors of the paper's driven five-bar are off by 1e-8 m, which makes its singularity hard
     "uneven five-bar": (lambda: settings.imprecise(settings.kinematic(SCENES["five_bar"]()), 1e-8, 0), 20.0),

@@ -130,10 +130,10 @@ def test_reactions_by_the_judge_obey_newtons_and_eulers_equations_of_every_body(
 @each(lambda scene: bool(scene.joint))
 def test_reactions_by_the_judge_have_no_part_along_a_motion_that_their_joint_allows(name):
     """Forces of loads, drivers and rotors along a coordinate are no reactions; forces of couplings are. The
-    part along a motion is relative to the largest force."""
+    part along a motion is relative to the largest force; 6e-15 is measured, by Bricard's linkage."""
     scene, run = at_one_moment(name)
     found = with_exact_reactions(scene, run)
-    assert idle(scene, found, run) <= 1e-11
+    assert idle(scene, found, run) <= 1e-13
 
 
 def keeps_energy(scene: Scene) -> bool:

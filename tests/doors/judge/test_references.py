@@ -23,7 +23,6 @@ from tests.helpers.short_motions import CROSSED, MOTIONS, times_of
 ROUNDING = 2.2e-16
 LIMIT = 60.0  # CPU s of a reference; each takes about 0.2
 
-
 EXPENSIVE = {  # more than 0.8 CPU s each
     *("flyball_governor", "spatial_slider_crank", "planar_slider_crank", "planar_slider_crank_equal"),
     *("five_bar_gravity", "five hinges", "two loops on one crank"),

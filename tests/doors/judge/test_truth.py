@@ -15,7 +15,6 @@ from tests.helpers.parts import Z, hinge, spring
 
 ROUNDED = 1e-14  # m or rad: some roundings of numbers up to 1
 
-
 ROCKER_DRIVEN = SCENES["four_bar_gravity"]().with_(driver=(Driver(joint="D", polynomial=(0.0, 3.0)),))
 
 

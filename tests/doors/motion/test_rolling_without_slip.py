@@ -116,7 +116,7 @@ def test_wheel_rolls_down_an_incline(share):
     scene = Scene(name="slope", gravity=pull, body=[wheel], joint=[tread("slope", "ground", "wheel", TOP)])
     motion = mbref.simulate(scene, times=[0.0, 0.5, 1.0], rtol=1e-11)
     assert motion.position[:, 0, 0] == pytest.approx(pull[0] / (1 + share) * motion.times**2 / 2, rel=1e-10)
-    assert motion.reactions["slope"][:, 0] == pytest.approx(3 * [-MASS * pull[0] * share / (1 + share)])
+    assert motion.reactions["slope"][:, 0] * (1 + share) == pytest.approx(-MASS * pull[0] * share, rel=1e-10)
 
 
 @pytest.mark.parametrize(
@@ -177,16 +177,17 @@ def test_wheel_adds_the_inertia_of_its_turn_to_a_spring_a_motor_a_stop_and_a_lat
     assert swing.position[:, 0, 0] == pytest.approx(0.5 / rate * np.sin(rate * TIMES), abs=1e-11)
     driven = trolley(driver=[{"joint": "track", "polynomial": [0.0, 0.3, 0.2]}])
     motion, force = mbref.simulate(driven, times=[0.0, 1.0]), 0.4 * EFFECTIVE  # N, with x'' = 2 · 0.2 m/s²
-    assert mbref.inverse_dynamics(motion, ["track"]).motors["track"].force == pytest.approx(force)
-    assert mbref.inverse_dynamics(motion, ["axle"]).motors["axle"].torque == pytest.approx(force * R)
+    assert mbref.inverse_dynamics(motion, ["track"]).motors["track"].force == pytest.approx(force, 1e-12)
+    assert mbref.inverse_dynamics(motion, ["axle"]).motors["axle"].torque == pytest.approx(force * R, 1e-12)
     bounce = mbref.simulate(trolley(speed=0.8, stop={"upper": 0.4, "restitution": 0.5}), times=[0.4, 0.6])
-    assert bounce.velocity[:, 0, 0] == pytest.approx([0.8, -0.4]) == bounce.angular_velocity[:, 1, 1] * R
+    speeds = bounce.velocity[:, 0, 0], bounce.angular_velocity[:, 1, 1] * R  # m/s, of hub and rim
+    assert np.abs(np.array(speeds) - [0.8, -0.4]).max() < 1e-12
     block = {"name": "block", "mass": 3.0, "inertia": [1.0, 1.0, 1.0], "position": [1.0, 0.0, R]}
     bar = joint("bar", "distance", "hub", "block", anchors=[TOP, (1.0, 0.0, R)], active=[[0.4, 2.0]])
     way = slide("way", "ground", "block", (1.0, 0.0, R))
     held = trolley(way, {**bar, "engages": "anywhere"}, body=[block], speed=0.8)
     caught = mbref.simulate(held, times=[0.2, 0.6]).velocity[:, 0, 0]
-    assert caught == pytest.approx([0.8, 0.8 * EFFECTIVE / (EFFECTIVE + 3.0)])
+    assert caught == pytest.approx([0.8, 0.8 * EFFECTIVE / (EFFECTIVE + 3.0)], rel=1e-12)
     rope = joint("rope", "distance", "ground", "hub", anchors=[(-1.0, 0.0, R), TOP], release={"force": 5.0})
     pull = {"type": "force", "body": "hub", "point": TOP, "force": X, "factor": {"polynomial": [0.0, 10.0]}}
     torn = mbref.simulate(trolley(rope, load=[pull]), times=[0.4, 1.0]).position[:, 0, 0]

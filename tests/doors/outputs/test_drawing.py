@@ -14,7 +14,7 @@ from mbref.motions.drawing.picture import moving, side_by_side, still
 from mbref.motions.drawing.shapes import at_rest, shapes
 from mbref.motions.drawing.timeline import Timeline
 from mbref.motions.drawing.view import Page, View, view_of
-from mbref.scene import JOINT_TYPES, Scene
+from mbref.scene import JOINT_TYPES, LOAD_TYPES, Scene
 from mbref.scenes import SCENES
 from tests.helpers.parts import X, Y, Z, spring
 
@@ -250,14 +250,16 @@ def test_every_load_and_driver_has_a_picture_of_its_own():
     scene = SCENES["planar_slider_crank"]().with_(load=())
     loads = [
         {"type": "force", "body": "rod", "point": [0.5, 0, 0], "force": [0, 1, 0]},
-        {"type": "moment", "body": "crank", "moment": [0, 0, -1]},
-        {"type": "moment", "body": "crank", "moment": [0, 0, 1]},
+        *({"type": "moment", "body": "crank", "moment": [0, 0, sense]} for sense in (-1, 1)),
+        *({"type": "joint_torque", "joint": "A", "torque": sense} for sense in (-1, 1)),
+        *({"type": "joint_force", "joint": "D", "force": sense} for sense in (-1, 1)),
         spring("ground", (1, 0, 0), "slider", (0.7, 0, 0), 1.0, 1.0),
-        {"type": "torsion_spring", "joint": "A", "stiffness": 1},
+        *({"type": f"{k}_spring", "joint": j, "stiffness": 1} for k, j in (("torsion", "A"), ("slide", "D"))),
     ]
     pictures = {still(scene.with_(load=(load,))) for load in loads}
     drivers = [{"joint": joint, "polynomial": [0.0, rate]} for joint, rate in (("A", 1), ("A", -1), ("D", 1))]
     pictures |= {still(scene.with_(driver=(driver,))) for driver in drivers} | {still(scene)}
+    assert {load["type"] for load in loads} == set(LOAD_TYPES)
     assert len(pictures) == len(loads) + len(drivers) + 1
 
 

@@ -135,7 +135,6 @@ RODS = [rod("upper", (0.5, 0.0, 0.0)), rod("lower", (1.5, 0.0, 0.0))]
 PINS = [hinge("A", ("ground", "upper")), hinge("B", ("upper", "lower"), (1.0, 0.0, 0.0))]
 CHAIN = Scene(name="chain", body=RODS, joint=PINS)
 
-
 SPRUNG = CHAIN.with_(
     joint=[
         *CHAIN.joint,
