@@ -1,4 +1,4 @@
-"""Drift of momentum / two free bodies by hand; violations of the suite as files, and their reduction."""
+"""Drift of momentum of two free bodies, by hand; violations of the suite as files, and their reduction."""
 
 import shlex
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Parts that adapters share / steps, samples, frames, coordinates and refusals worked out by hand."""
+"""Functions that adapters share: refusals of loads, samples of a run, and the search for a compiler."""
 
 import math
 

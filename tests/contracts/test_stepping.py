@@ -1,4 +1,4 @@
-"""Integrators outside the engines, and Picard's iteration of the judge / closed forms."""
+"""Integrators outside the engines, and the judge's Picard iteration, against closed forms."""
 
 import math
 from concurrent.futures import ThreadPoolExecutor

@@ -1,4 +1,4 @@
-"""Words for numbers and lists / worked out by hand, at the ends of ranges."""
+"""Words for numbers and lists, worked out by hand at the ends of ranges."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Imported scenes / the original models, whose matrices by MuJoCo are integrated finely."""
+"""Imported scenes against the original models, whose matrices by MuJoCo are integrated finely."""
 
 import mujoco
 import numpy as np

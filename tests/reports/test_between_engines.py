@@ -1,4 +1,4 @@
-"""Sections on accelerations, reactions and support / records with known differences put in."""
+"""Sections on accelerations, reactions and support, of records with known differences put in."""
 
 from dataclasses import replace
 from functools import cache

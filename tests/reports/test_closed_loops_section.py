@@ -1,4 +1,4 @@
-"""The section on closed loops / cells, rows, depths of colour and commands worked out by hand."""
+"""The section on closed loops against cells, rows, styles and commands worked out by hand."""
 
 import pytest
 

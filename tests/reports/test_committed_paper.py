@@ -1,4 +1,4 @@
-"""The committed page on the paper: its text / its records, rendered again; the page of the site."""
+"""The committed page on the paper equals its records, rendered again; the page of the site."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The committed stability ladders: their text / their records, rendered again; a record for every run."""
+"""The committed stability ladders equal their records, rendered again; a record for every run."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The section on conformance: what `crosscheck verify --json` prints / counts, violations, causes."""
+"""The section on conformance: counts, violations and causes of what `crosscheck verify --json` prints."""
 
 import json
 from collections import Counter

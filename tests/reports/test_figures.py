@@ -1,4 +1,4 @@
-"""Figures: what the records say / what is drawn."""
+"""Figures draw what the records say."""
 
 import functools
 import io

@@ -1,4 +1,4 @@
-"""The first screen: records / the matrix, the moving mechanism, the figure that can be asked, the records."""
+"""The first screen has the matrix, the mechanism and the figure that follow from the records."""
 
 import re
 from html.parser import HTMLParser

@@ -1,4 +1,4 @@
-"""Mechanisms of the report and the README: what is drawn / the trajectories that it was made of."""
+"""Mechanisms of the report and the README are drawn as the trajectories that they were made of."""
 
 import xml.etree.ElementTree as ET
 

@@ -1,4 +1,4 @@
-"""The paper's section: made-up records / the marks, numbers and words in its tables; nothing is simulated."""
+"""The paper's section: marks, numbers and words in its tables, from made-up records; nothing is simulated."""
 
 import dataclasses
 import math

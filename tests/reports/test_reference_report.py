@@ -1,4 +1,4 @@
-"""The committed report: its text / its records, rendered again."""
+"""The committed report equals its records, rendered again."""
 
 import re
 from pathlib import Path

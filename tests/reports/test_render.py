@@ -1,4 +1,4 @@
-"""The written report: blocks / page, Markdown and pictures; and the program that writes it."""
+"""The page, Markdown and pictures that are written from blocks; repeated timings of short runs."""
 
 import html
 import re

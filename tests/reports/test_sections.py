@@ -1,4 +1,4 @@
-"""Sections: the records / the numbers and words in the blocks; nothing is simulated."""
+"""Sections: numbers and words in the blocks, from made-up records; nothing is simulated."""
 
 import dataclasses
 import re

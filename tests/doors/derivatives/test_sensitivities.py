@@ -55,7 +55,7 @@ def angle_of_pendulum(times, mass, inertia, x, y, gravity, start):
 
 
 def test_derivatives_of_a_pendulums_angle_equal_those_of_jacobis_function():
-    """The closed form is differentiated by a complex step; stated errors are at least a tenth of the true."""
+    """The closed form is differentiated by a complex step; stated errors are at least 1/10 of true ones."""
     numbers = {"mass": 1.3, "inertia": 0.07, "x": 0.0, "y": 0.0, "gravity": -GRAVITY, "start": 0.0}
     paths = ["body[bob].mass", "body[bob].inertia[2]", "joint[A].anchor.x", "joint[A].anchor.y"]
     times = np.array([0.3, 1.7])

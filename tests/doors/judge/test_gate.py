@@ -1,5 +1,5 @@
 """The comparison of models, ``gate`` for short runs and ``along`` for accelerations of whole runs: a run
-passes if its model is the scene's, and one fault is found."""
+passes if its model is the scene's, and does not with one fault in it."""
 
 from dataclasses import replace
 
@@ -144,7 +144,7 @@ def fault_in_single_precision(scene, run, rounding=2.0**-23):
 
 
 def test_states_in_single_precision_pass_only_if_the_engine_declares_its_rounding():
-    """Rounded to 24 bits, they pass at a declared rounding of 2⁻²³, not of 2⁻⁵²; missing gravity is found."""
+    """States of 24 bits pass at a declared rounding of 2⁻²³, not of 2⁻⁵²; missing gravity is found."""
     scene = FOUR_BAR
     exact, weightless = short_run(scene), scene.with_(gravity=(0.0, 0.0, 0.0))
     assert fault_in_single_precision(scene, exact) == ""

@@ -1,4 +1,4 @@
-"""Laws of mechanics that motions, loads, reactions and drivers of the judge obey at 0.43 of the duration."""
+"""Laws of mechanics that the judge's motions, loads, reactions and drivers obey at 0.43 of the duration."""
 
 import functools
 from collections.abc import Callable

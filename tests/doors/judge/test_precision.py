@@ -1,4 +1,4 @@
-"""Digits of a run / single precision, noise, numbers that are no evidence; the precision an engine claims."""
+"""Single precision, noise and numbers that are no evidence in a run; the precision an engine claims."""
 
 from dataclasses import replace
 

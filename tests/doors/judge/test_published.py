@@ -111,7 +111,7 @@ def test_numbers_printed_for_the_four_bar_a02_are_within_4e_6_of_its_closed_form
 
 
 @pytest.mark.slow
-def test_published_governor_is_off_by_the_error_of_its_step():
+def test_printed_slide_of_the_published_governor_is_off_by_six_micrometres():
     """The printed s, of a method of second order with steps of 0.5 ms, is 6e-6 to 7e-6 m off the judge's
     reference after 10 s, and the printed s' less than 1e-6 m/s."""
     problem = PUBLISHED["A05"]

@@ -1,4 +1,4 @@
-"""Measures of published problems / motions of a block and of two hinges, off by known amounts."""
+"""Measures of published problems, on motions of a block and of two hinges that are off by known amounts."""
 
 from dataclasses import replace
 

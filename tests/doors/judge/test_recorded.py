@@ -1,4 +1,4 @@
-"""Recorded motions / the reference: exact ones are right, planted differences are the first explanation."""
+"""Recorded motions: exact ones are right, and a planted difference is the first explanation."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The judge's reference / closed forms, other formulations and precisions; its bound, limits and cache."""
+"""The judge's reference against closed forms, formulations and precisions; its bound, limits and cache."""
 
 import json
 import time

@@ -1,4 +1,4 @@
-"""The judge's equilibria, steady motions and eigenvalues / closed forms; engines about the judge's poses."""
+"""The judge's equilibria, steady motions and eigenvalues against closed forms; engines at these poses."""
 
 from functools import cache
 

@@ -1,4 +1,4 @@
-"""Formulation B of the reference, in coordinates of a spanning tree / closed forms and formulation A."""
+"""Formulation B of the reference, by a spanning tree, against closed forms and formulation A."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ SECONDS = 100.0
 
 
 @pytest.mark.parametrize(
-    ("formulation", "name", "end", "close"),  # s; m, as they magnify rounding
+    ("formulation", "name", "end", "close"),  # s; m: crossings magnify rounding
     [
         (tree_motion, "four_bar", 0.1, 1e-11),
         (tree_motion, "four_bar_quarter", 0.1, 1e-11),

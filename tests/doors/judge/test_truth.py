@@ -1,4 +1,4 @@
-"""The judge's truths / textbook formulas, quadrature and conserved quantities."""
+"""The judge's truths against textbook formulas, quadrature and conserved quantities."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""Closed forms of scenes / formulas, other descriptions of a scene, and scenes that have none."""
+"""Closed forms of scenes against formulas and other descriptions of a scene; scenes that have none."""
 
 import numpy as np
 import pytest

@@ -151,7 +151,7 @@ def test_velocities_too_fast_by_a_share_have_that_error_and_kinetic_energies_tha
     assert energy_series(scene, run) == pytest.approx(drift, abs=ROUNDING)
 
 
-def test_violation_of_a_joint_is_the_gap_that_is_put_in_at_every_level():
+def test_violation_of_a_joint_is_a_component_of_the_gap_that_is_put_in_at_every_level():
     """Three rows of a hinge are components of its gap or of its rates: the largest is at least 1/√3 of it."""
     _, _, exact = exact_of(double_hinge)
     for level, factor in (("position", 1), ("velocity", 10), ("acceleration", 100)):

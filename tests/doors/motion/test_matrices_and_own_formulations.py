@@ -166,7 +166,7 @@ def test_own_stabilisation_replaces_the_state_after_each_step():
     ids=["no inverse", "not a number", "leaves the constraints"],
 )
 def test_own_formulation_that_fails_ends_the_run_with_the_outcome_of_its_failure(formulation, outcome, says):
-    """It inverts a matrix of zeros, returns NaN, or returns numbers with which the pendulum's joint opens."""
+    """The function inverts zeros, returns NaN, or returns numbers with which the pendulum's joint opens."""
     ended = mbref.simulate("point_pendulum", formulation=formulation)
     assert ended.outcome.name == outcome and says in ended.message
 

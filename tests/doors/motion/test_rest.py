@@ -44,7 +44,7 @@ def test_start_at_rest_on_a_singular_position_needs_no_sample_at_the_start():
 
 
 def test_flat_parallelogram_without_forces_stays_and_no_branch_is_chosen():
-    """Nothing pushes it, so that it moves by rounding alone; the message states no choice."""
+    """Nothing pushes the bodies, so that they move by rounding alone; the message states no choice."""
     run = simulate(flat_parallelogram(moment=0.0).with_(load=()), times=TIMES)
     assert run.outcome.label == "COMPLETED" and np.ptp(run.position, axis=0).max() < ROUNDING
     assert "begins at rest" not in run.message

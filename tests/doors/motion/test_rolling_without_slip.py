@@ -226,7 +226,7 @@ def test_reaction_has_no_power_and_accelerates_the_disc(wobbling):
     [*((each, None) for each in ("turned", "millimetres", "later")), ("millimetres", "lm1+partitioning")],
 )
 def test_motion_does_not_depend_on_frame_units_and_start(wobbling, change, method):
-    """Turned and moved, in millimetres and tonnes, or from half time on, it moves alike to 100 rtol."""
+    """Turned and moved, in millimetres and tonnes, or from half time on, the disc moves alike to 100 rtol."""
     turn, shift, size, begin = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), 1.0, 0
     (body,), (floor,) = WOBBLING.to_dict()["body"], WOBBLING.to_dict()["joint"]
     if change == "turned":

@@ -36,7 +36,7 @@ def test_parallelogram_moves_by_its_closed_form_through_three_crossings_beside_a
 
 
 def test_samples_just_after_a_crossing_meet_the_closed_form_at_a_loose_tolerance():
-    """For 50 ms after it poses are off by less than rtol / 10, accelerations by 10 rtol of the largest."""
+    """For 50 ms poses are off by less than rtol / 10, accelerations by less than 10 rtol of the largest."""
     scene = four_bar_gravity()
     first, loose = simulate(scene, "taylor", [1.0], Limits(rtol=RTOL)).crossings[0].time, 1e-4
     times = first + np.geomspace(1e-6, 5e-2, 40)

@@ -124,7 +124,7 @@ def test_chain_of_slider_cranks_completes_though_single_pivots_vanish(loops, rto
 
 @pytest.mark.parametrize("distance", [3e-2, 1e-1])
 def test_swing_that_turns_back_before_the_flat_position_is_completed_by_projection(distance):
-    """Released ``distance`` (rad) from it, a rhombus crosses nothing and is right to 1000 rtol."""
+    """Released ``distance`` (rad) from flat, a rhombus crosses nothing and is right to 1000 rtol."""
     scene, rtol = four_bar_gravity(-distance), 1e-9
     run = simulate(scene, "alf-dual+projection", np.linspace(0.0, 1.5, 9), Limits(rtol=rtol))
     assert relative_error(run, scene) < 1000 * rtol and run.crossings == ()

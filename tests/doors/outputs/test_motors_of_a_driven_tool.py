@@ -122,8 +122,8 @@ def test_powers_of_motors_are_the_powers_of_the_drivers_that_they_replace():
 
 
 def test_torques_as_tables_move_the_free_arm_along_the_circle():
-    """The torques are tables of 401 rows, which move the unstable arm for 0.5 s. The spline of a torque T
-    sin(π t) at a distance h has an error of T (π h)⁴ / 384, about 2e-10 T; gravity magnifies it 100 times."""
+    """Tables of 401 rows of torques move the unstable arm for 0.5 s. The spline of a torque T sin(π t) at a
+    distance h has an error of T (π h)⁴ / 384, about 2e-10 T; gravity magnifies it by 100. Limit: 1e-7 m."""
     times, dense = np.linspace(0.0, 0.5, 6), np.linspace(0.0, DURATION, 401)
     found = mbref.inverse_dynamics(mbref.simulate(arm(), times=dense, rtol=1e-13), ["A", "E"]).motors
     rows = {n: list(zip(dense.tolist(), m.torque.tolist(), strict=True)) for n, m in found.items()}
@@ -204,7 +204,7 @@ def test_motors_of_a_driven_crank_are_undecided_at_singular_positions_only(name,
 @pytest.mark.parametrize("motor", "AD")
 def test_motor_near_a_folded_crank_has_its_limit_or_is_undecided(motor, times):
     """The rod is as long as the crank A, which turns by 2 π rad/s and is upright at 0.25 s. Nearby the power
-    of driver and motor is in proportion to the time left. It is met to 1e-3, or not given."""
+    is in proportion to the time left. It is met to 1e-3, or not given (NaN), as in the last microsecond."""
     driver = Driver(joint="A", polynomial=(0.0, 2 * np.pi))
     scene = mbref.find_scene("planar_slider_crank_equal").with_(gravity=DOWN, load=(), driver=[driver])
     slope = mbref.simulate(scene, times=[0.249], rtol=1e-13).driver("A").power[0] / 0.001  # W/s
