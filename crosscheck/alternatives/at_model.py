@@ -15,6 +15,7 @@ from crosscheck.conformance.runners import InProcess, Isolated, Runner
 from crosscheck.conformance.trial import Broken
 from crosscheck.engine import Alternatives, engine
 from crosscheck.judge.model_identity import acceleration_scale
+from crosscheck.judge.pieces import has_pieces
 from crosscheck.processes.child import ChildFailed
 from crosscheck.processes.pool import ask
 from crosscheck.study.words.speed import TITLES
@@ -38,8 +39,9 @@ class Disagreement(NamedTuple):
 
 
 def disagreements(scene: Scene, engines: Sequence[str]) -> list[Disagreement]:
-    """Return the worst pair of each group of ways that differ above their limit, of installed engines."""
-    if not scene.has_mass() or not acceleration_scale(scene):
+    """Return the worst pair of each group of ways that differ above their limit, of installed engines; none
+    for a scene whose constraints come and go."""
+    if has_pieces(scene) or not scene.has_mass() or not acceleration_scale(scene):
         return []
     return [one for name in engines for one in _of_engine(scene, name)]
 

@@ -28,9 +28,9 @@ from crosscheck.study.record_view import (
     never_moved,
     varied_settings,
 )
-from crosscheck.study.search.cheapest import Criterion, known_error, opened
+from crosscheck.study.search.cheapest import Criterion, known_error
+from crosscheck.study.words.file import uncounted_closures
 from crosscheck.study.words.speed import LEVEL, SAID, title
-from crosscheck.study.words.text import listed
 from crosscheck.study.words.verdict import Verdict
 from mbref.scene import Scene
 
@@ -57,7 +57,7 @@ def print_runs(console: Console, records: Sequence[Record], scenes: Sequence[Sce
             table.add_row(*_identity(r, group), f"{_outcome(r)}{_at(r)}", *numbers, _seconds(r))
         console.print(table)
         if name in known:
-            _print_uncounted(console, group, known[name])
+            console.print(uncounted_closures(group, known[name]), markup=False, end="")
         _print_messages(console, group)
 
 
@@ -197,16 +197,7 @@ def _print_best(console: Console, group: Judged) -> None:
     console.print(table)
     if all(r["metrics"].get("energy_error") is None for r in group.records):
         console.print(NO_ENERGY)
-    _print_uncounted(console, list(best.values()), group.scene)
-
-
-def _print_uncounted(console: Console, records: Sequence[Record], scene: Scene) -> None:
-    """Print the couplings that leave the closures of some runs unknown."""
-    unknown = [r for r in records if r["times"] and r["metrics"].get("violation_position", 0.0) is None]
-    names = dict.fromkeys(name for r in unknown for name in opened(r, scene).uncounted)
-    if names:
-        said = listed([f"coupling {name!r}" for name in names])
-        console.print(f"closure –: full turns of {said} between samples cannot be counted", markup=False)
+    console.print(uncounted_closures(list(best.values()), group.scene), markup=False, end="")
 
 
 def _print_advice(console: Console, group: Judged, path: str) -> None:

@@ -27,6 +27,8 @@ MOST_IDLE = 8  # idle children: about one for every engine
 NO_ENGINE = ""  # name of the engine-free child that computes metrics for the judge
 EVERY_ENGINE = "*"  # name of the child in which the runs of all engines take turns
 ESTIMATED = 0.1  # fraction of a run's time limit that its error estimate may take
+FAR_BEHIND = 100.0  # time / time of the fastest setting; above it further repeats do not change the ranking
+TIMING_SECONDS = 20.0  # CPU s of all runs of a scene by turns, after which no further repeat begins
 READY_SECONDS = 600.0  # s for imports and compilation, before the time limit of a run applies
 
 Question = Callable[..., Trajectory]  # a function of `serve` that makes a run
@@ -143,20 +145,46 @@ def ask(engine_name: str, question: Callable[..., Any], about: tuple[Any, ...], 
 
 
 def time_interleaved(
-    scene: Scene, times: np.ndarray, jobs: Sequence[serve.Job], repeats: int, time_limit: float
+    scene: Scene,
+    times: np.ndarray,
+    jobs: Sequence[serve.Job],
+    repeats: int,
+    time_limit: float,
+    after_round: Callable[[], None] = lambda: None,
+    most_seconds: float = TIMING_SECONDS,
 ) -> list[list[float]]:
-    """Return CPU seconds of stepping for speed comparisons: for every job a list of ``repeats`` times.
+    """Return CPU seconds of stepping for speed comparisons: for every job a list of up to ``repeats`` times.
 
     The jobs (engine name, setting) take turns in one child process after a warm-up round, so that all jobs
     see the same machine. An idle child of the first job's engine is used, since mbref's child has loaded
-    kernels. The same child times the next scene. A run that does not complete has NaN.
-    ``time_limit`` (s) is for all jobs together. Raises ChildFailed if the child gives no result, LookupError
-    for an unknown engine.
+    kernels. The same child times the next scene. A run that does not complete has NaN. A job that takes more
+    than FAR_BEHIND times as long as the fastest one has one repeat. A further repeat begins only before all
+    runs have taken ``most_seconds`` of CPU time, with what is not stepping, such as a search for events.
+    ``time_limit`` (s) is for all jobs of a round together. Raises ChildFailed if the child gives no result,
+    LookupError for an unknown engine.
     """
     for engine_name, _ in jobs:
         _check(engine_name)
+    found: list[list[float]] = [[] for _ in jobs]
     with _in_use(EVERY_ENGINE, instead=jobs[0][0]) as child:
-        return child.call(serve.run_interleaved, (scene, times, list(jobs), repeats), time_limit).value
+
+        def a_round(chosen: Sequence[int]) -> list[tuple[float, float]]:
+            asked = scene, times, [jobs[k] for k in chosen]
+            rows: list[tuple[float, float]] = child.call(serve.run_round, asked, time_limit).value
+            after_round()
+            return rows
+
+        warm = a_round(range(len(jobs)))
+        spent = sum(whole for _, whole in warm)
+        limit = FAR_BEHIND * min((s for s, _ in warm if s > 0.0), default=float("inf"))
+        for number in range(repeats):
+            chosen = [k for k, (before, _) in enumerate(warm) if number == 0 or not before > limit]
+            if not chosen or (number and spent > most_seconds):
+                break
+            for k, (seconds, whole) in zip(chosen, a_round(chosen), strict=True):
+                found[k].append(seconds)
+                spent += whole
+    return found
 
 
 def end_idle() -> None:

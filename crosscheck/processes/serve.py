@@ -15,6 +15,7 @@ import faulthandler
 import os
 import pickle
 import sys
+import time
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
@@ -33,7 +34,6 @@ from mbref.scene import Scene
 Job = tuple[str, Setting]  # engine name and setting
 Capabilities = tuple[str, Cannot | None, list[Setting]]
 GREETING = None
-FAR_BEHIND = 100.0  # time / time of the fastest setting; above it further repeats do not change the ranking
 
 
 def get_ready(engine_name: str, families: Sequence[str]) -> tuple[str, float]:
@@ -110,26 +110,17 @@ def _unserved(family: str) -> Cannot:
     return Cannot(Owner.MODEL, f"{family} has no settings for this scene")
 
 
-def run_interleaved(scene: Scene, times: np.ndarray, jobs: Sequence[Job], repeats: int) -> list[list[float]]:
-    """Return ``cost.seconds`` for every repeat of every job, round-robin after a warm-up round.
+def run_round(scene: Scene, times: np.ndarray, jobs: Sequence[Job]) -> list[tuple[float, float]]:
+    """Return ``cost.seconds`` of one run of every job, and the CPU time (s) of the whole run.
 
-    A job that takes more than FAR_BEHIND times as long as the fastest one has one repeat. A run that did not
-    complete has NaN, since its time is not the time of a complete run.
+    A run that did not complete has NaN, since its time is not the time of a complete run.
     """
-    simulators = [(engine(name), setting) for name, setting in jobs]
-
-    def seconds_of(job: int) -> float:
-        simulator, setting = simulators[job]
-        run = simulator.run(scene, times, setting)
-        return run.cost.seconds if run.outcome is Outcome.COMPLETED else float("nan")
-
-    warm = [seconds_of(job) for job in range(len(jobs))]
-    limit = FAR_BEHIND * min((s for s in warm if s > 0.0), default=float("inf"))
-    found: list[list[float]] = [[] for _ in jobs]
-    for number in range(repeats):
-        for job, before in enumerate(warm):
-            if number == 0 or not before > limit:
-                found[job].append(seconds_of(job))
+    found = []
+    for name, setting in jobs:
+        began = time.process_time()
+        run = engine(name).run(scene, times, setting)
+        seconds = run.cost.seconds if run.outcome is Outcome.COMPLETED else float("nan")
+        found.append((seconds, time.process_time() - began))
     return found
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from statistics import median
 
 import numpy as np
@@ -14,17 +15,19 @@ from crosscheck.judge.metrics import at_samples
 from crosscheck.judge.model_identity import along, differences, gate_times
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth import NoSolution, truth_for
-from crosscheck.processes.pool import ChildFailed, time_interleaved
-from crosscheck.processes.serve import FAR_BEHIND
+from crosscheck.processes.pool import FAR_BEHIND, ChildFailed, time_interleaved
 from crosscheck.setting import best_family
 from crosscheck.study.grades import Grade, grade
 from crosscheck.study.grid import Case, Record
+from crosscheck.study.progress import counted
 from crosscheck.study.record_view import is_completed
 from crosscheck.study.search.least_errors import least_errors
 from crosscheck.study.search.offers import settings
 from crosscheck.study.words.speed import COMPILED
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
+
+SHORT = 5.0  # s; a shorter timing shows no progress
 
 
 def identity_cases(scene: Scene, engines: Sequence[str], time_limit: float) -> list[Case]:
@@ -129,7 +132,10 @@ def timed(
         ]
         try:
             found = _seconds(scene, [cases[i] for i in places], repeats)
-            if once := sum(len(seconds) < repeats for seconds in found):
+            rounds = max(map(len, found), default=repeats)
+            if rounds < repeats:
+                notice(f"{scene.name}: {rounds} of {repeats} repeats, because each takes long")
+            if once := sum(len(seconds) < rounds for seconds in found):
                 notice(
                     f"{scene.name}: {once} of {len(found)} settings take over {FAR_BEHIND:g} times as long "
                     "as the fastest, and are timed once"
@@ -146,7 +152,8 @@ def _seconds(scene: Scene, cases: Sequence[Case], repeats: int) -> list[list[flo
         return []
     limit = (repeats + 1) * sum(case.time_limit for case in cases)
     jobs = [(case.engine, case.setting) for case in cases]
-    return time_interleaved(scene, cases[0].times, jobs, repeats, limit)
+    with counted("timing", repeats + 1, SHORT) as advance:
+        return time_interleaved(scene, cases[0].times, jobs, repeats, limit, partial(advance, scene.name))
 
 
 def _with_cost(record: Record, seconds: Sequence[float]) -> Record:

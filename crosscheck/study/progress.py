@@ -74,16 +74,17 @@ class UnderWay:
 
 
 @contextmanager
-def counted(what: str, total: int) -> Iterator[Callable[[str], None]]:
-    """Show progress from 0 to ``total``; yields a function that advances it by one and names the finished
-    work."""
+def counted(what: str, total: int, quiet: float = 0.0) -> Iterator[Callable[[str], None]]:
+    """Show progress from 0 to ``total``, after ``quiet`` seconds; yields a function that advances it by one
+    and names the finished work."""
     with _display(what, total) as (show, _):
-        done = 0
+        done, began = 0, time.monotonic()
 
         def advance(last: str) -> None:
             nonlocal done
             done += 1
-            show(done, total, last)
+            if time.monotonic() - began >= quiet:
+                show(done, total, last)
 
         yield advance
 

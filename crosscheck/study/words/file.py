@@ -79,6 +79,14 @@ def _bodies(metrics: dict[str, float], length: float) -> str:
     return f"bodies are off by up to {moved * 1e3:.2g} mm and {turned:.2g} rad"
 
 
+def uncounted_closures(records: Sequence[Record], scene: Scene) -> str:
+    """Return a line on the couplings that leave closures of runs unknown; empty without one."""
+    unknown = [r for r in records if r["times"] and r["metrics"].get("violation_position", 0.0) is None]
+    names = dict.fromkeys(name for r in unknown for name in opened(r, scene).uncounted)
+    said = listed([f"coupling {name!r}" for name in names])
+    return f"closure –: full turns of {said} between samples cannot be counted\n" if names else ""
+
+
 def free_falls(groups: Sequence[Judged]) -> list[str]:
     """Return a sentence on the scenes that only fall: such a run verifies nothing."""
     falling = [group.scene for group in groups if falls_freely(group.scene)]

@@ -11,6 +11,7 @@ from crosscheck.cli.commands import main
 from crosscheck.engine import engine, installed
 from crosscheck.invariants.experiments import four_bar
 from tests.helpers.falling_engine import STONE
+from tests.helpers.intermittent_mechanisms import intermittent_mechanism
 
 CHAINS = Path(__file__).parents[3] / "examples" / "four_chains.xml"
 SEVERAL = "tests.helpers.falling_engine:SEVERAL"
@@ -22,6 +23,7 @@ def test_way_with_too_much_gravity_is_named_beside_the_way_that_gauss_principle_
     assert found.apart == pytest.approx(1 / 3, rel=1e-12) and found.ways == ("light", "heavy")
     assert "in acceleration of 'stone'; Gauss's principle supports 'light'" in found.sentence
     assert disagreements(STONE.with_(gravity=(0.0, 0.0, 0.0)), [SEVERAL]) == []  # nothing moves
+    assert disagreements(intermittent_mechanism(1), [SEVERAL]) == []  # has no one set of equations
 
 
 def test_compare_shows_solvers_that_differ():

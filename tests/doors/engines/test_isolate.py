@@ -255,6 +255,14 @@ def test_setting_a_hundred_times_behind_the_fastest_is_timed_once(tmp_path: Path
     assert seconds == [[0.5], [0.001] * 3, [0.09] * 3]
 
 
+def test_timing_beyond_its_cpu_time_ends_after_one_repeat_and_reports_each_round(tmp_path: Path):
+    """No CPU time is left after the untimed round: of five repeats one is made, in two rounds."""
+    rounds, jobs = [], [(f"{FAKES}:RECORDER", Setting("a", {"seconds": 0.5}))]
+    scene = still(str(tmp_path / "log"))
+    found = time_interleaved(scene, TIMES, jobs, 5, 60.0, lambda: rounds.append(1), most_seconds=0.0)
+    assert found == [[0.5]] and len(rounds) == 2
+
+
 def test_a_crash_among_interleaved_runs_is_raised_with_its_signal():
     """The second of two engines, SEGFAULT, ends its process by the signal SIGSEGV."""
     jobs = [(f"{FAKES}:FAKE", PLAIN), (f"{FAKES}:SEGFAULT", PLAIN)]
