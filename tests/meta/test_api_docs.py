@@ -184,7 +184,7 @@ def test_fault_of_an_incomplete_docstring_is_named(tmp_path, old, new, fault):
 
 
 def test_section_that_repeats_the_signature_is_found(tmp_path):
-    """A section Returns with the type alone says nothing new; described, or left out, it is right."""
+    """A section Returns with the type alone says nothing new; a described section, or none, is right."""
     described = REPEATED.replace("    str\n", "    str\n        In lower case.\n")
     without = REPEATED.replace("    Returns\n    -------\n    str\n", "")
     texts = REPEATED, described, without

@@ -66,7 +66,7 @@ def test_new_formulation_appears_in_list_table_page_and_contents(monkeypatch, ca
 
 
 def test_page_of_methods_has_the_generated_table_of_formulations():
-    """``with_table`` writes the table into the page, which it must not change; ``with_links`` links names."""
+    """``with_table`` writes the table into the page, which must stay equal; ``with_links`` links names."""
     text = (DOCS / "methods.md").read_text()
     assert method_pages.with_table(text) == text, "python docs/method_pages.py renews the table"
     for name in FORMULATIONS:

@@ -144,7 +144,7 @@ def test_a_name_of_a_class_or_constant_has_one_meaning_in_mbref():
 
 
 def test_readme_has_at_most_120_lines():
-    """A reader sees it on three screens."""
+    """120 lines are three screens."""
     assert len((ROOT / "README.md").read_text().splitlines()) <= 120
 
 

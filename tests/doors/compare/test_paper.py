@@ -97,7 +97,7 @@ def test_errors_near_a_singular_position_raise_the_iterations_of_alf():
 
 def test_small_rank_tolerance_brakes_a_crank_tilted_out_of_its_plane():
     """Without stabilisation a tilt grows, and a row that is redundant in the plane counts as independent. At
-    12.2 s the crank has half of the true speed or less; with a raised tolerance it has it to 0.1 %."""
+    12.2 s the crank has half of the true speed or less; with a raised tolerance the true speed to 0.1 %."""
     braked, right = (
         simulated(Label("dynamic", "MPI (SVD)", runs.UNEQUAL, name), np.linspace(0, 12.2, 62))
         for name in (settings.BASE.name, runs.RAISED.name)

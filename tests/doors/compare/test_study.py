@@ -30,7 +30,7 @@ def case(family: str, fake: str = "FAKE", scene: Scene | None = None, limit: flo
 
 
 def test_record_of_a_study_holds_the_engine_s_trajectory():
-    """Read back from JSON the record is the trajectory of a run here. Case and machine are in it, too."""
+    """Read back from JSON the record is the trajectory of a run here; case and machine are recorded, too."""
     wanted = case("a")
     [record] = study([wanted], ThreadPoolExecutor(1))
     there = Trajectory.from_record("still", json.loads(json.dumps(record)))

@@ -32,8 +32,8 @@ def error_of(simulator, name: str, setting: Setting) -> float:
     "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in BY_HAND]
 )
 def test_equation_derived_by_hand_gives_the_true_motion(name: str):
-    """The engine LIMIT of benchmarks/limit.py integrates it at its finest setting. The error from the judge's
-    truth, a closed form or a solution of its own equation, is below 1e-8 of the length or rad."""
+    """LIMIT of benchmarks/limit.py integrates the equation at its finest setting. The error from the judge's
+    truth, a closed form or a solution of an equation of the judge, is below 1e-8 of the length or rad."""
     from limit import LIMIT
 
     scene = SCENES[name]()

@@ -50,8 +50,8 @@ def test_formulas_of_geared_mechanisms_equal_the_reference(make):
 
 
 def test_verify_fails_an_engine_that_prints_and_rests_where_a_body_falls(capsys):
-    """The engine CHATTER prints, does not move and refuses no scene, even one whose motion is undetermined:
-    it fails these checks. Its times, quaternions and processes are right."""
+    """CHATTER prints, does not move, and refuses no scene, even one whose motion is undetermined: the checks
+    of silence, truth and that refusal fail. Its times, quaternions and processes are right."""
     status = main(["verify", f"{FAKES}:CHATTER", "--scene", "free_fall", "--json"])
     record = json.loads(capsys.readouterr().out)
     verdicts = {v["property"]: v["status"] for v in record["verdicts"] if v["scene"] == "free_fall"}
@@ -145,8 +145,8 @@ def test_tables_of_verdicts_end_with_the_failures_and_a_summary():
 
 
 def test_coordinate_partitioning_passes_the_check_in_millimetres():
-    """The check compares the motion with that of the same scene in millimetres. Rounding of its numbers is
-    1000 times as large, and Newton's method of the partitioning has to end above it."""
+    """The check compares the motion with the one of the scene in millimetres. Rounding of millimetres is
+    1000 times as large, and Newton's method of the partitioning has to end above this rounding."""
     specimen, family = SPECIMENS["drawn loop"], "mpi-svd+partitioning"
     bench = trial.set_up(InProcess(engine("mbref")), specimen, family)
     verdict = suite.verdict_on("in millimetres", bench)

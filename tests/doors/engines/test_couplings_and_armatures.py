@@ -160,7 +160,7 @@ def test_engine_moves_a_coupling_with_offset_as_the_reference(name):
 
 
 def test_mujocos_adapter_refuses_a_scene_that_is_not_assembled():
-    """Poses of the file violate the coupling's offset. The reason names it, and the remedy."""
+    """Poses of the file violate the coupling's offset. The reason names the coupling, and the remedy."""
     refusal = engine("mujoco").cannot(shifted(gear_pair, "teeth", 0.4))
     said = "coupling 'teeth' has an offset (mbref.assembled(scene) has none), which the adapter does not map"
     assert refusal is not None and refusal.reason == said
@@ -194,7 +194,7 @@ def test_find_scenes_assembles_offsets_and_read_scenes_does_not(tmp_path):
 
 
 def test_mjcf_keeps_the_offset_of_a_coupling(tmp_path):
-    """A rack whose coupling has an offset of 3 mm is written and read again. It moves alike, to 1e-12 m; the
+    """A rack whose coupling has an offset of 3 mm is written and read again. Both move alike, to 1e-12 m; a
     rack without the offset is more than 2 mm away."""
     scene, path = shifted(rack, "teeth", 0.003), tmp_path / "rack.xml"
     formats.write(scene, path)

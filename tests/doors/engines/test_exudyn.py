@@ -121,7 +121,7 @@ def test_exudyns_defaults_end_at_redundant_constraints_with_the_cause():
 
 def test_exudyns_trapezoidal_rule_ends_at_a_singular_position_with_right_samples_before_it():
     """The slider-crank with equal links is singular at 0.0612 s; samples are 10 ms apart. The run ends within
-    ten steps of 0.1 ms of it, and the samples up to 0.06 s are off by at most ten times the measured 7.2e-6
+    ten steps of 0.1 ms of this, and the samples up to 0.06 s are off by at most ten times the measured 7.2e-6
     (of the length, or rad)."""
     scene = SCENES["planar_slider_crank_equal"]()
     trajectory = ENGINE.run(scene, np.linspace(0, 0.1, 11), Setting("trapezoidal", {"step": 1e-4}))

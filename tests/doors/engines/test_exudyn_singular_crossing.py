@@ -41,8 +41,8 @@ def true_nodes(scene: Scene, times: np.ndarray) -> tuple[np.ndarray, np.ndarray,
 
 
 def test_exact_states_before_a_singular_position_are_extrapolated_to_and_beyond_it():
-    """Twelve exact samples, 0.6 ms apart, end 0.2 ms before the singular position. At it and 0.2 ms after it
-    errors are at most ten times the measured 1.4e-14 m and 1.6e-11 m/s."""
+    """Twelve exact samples, 0.6 ms apart, end 0.2 ms before the singular position. At its time and 0.2 ms
+    later errors are at most ten times the measured 1.4e-14 m and 1.6e-11 m/s."""
     scene = SCENES["planar_slider_crank_equal"]()
     nodes = true_nodes(scene, SINGULAR - 2e-4 - 6e-4 * np.arange(12)[::-1])
     landing = np.array([SINGULAR, SINGULAR + 2e-4])
@@ -54,7 +54,7 @@ def test_exact_states_before_a_singular_position_are_extrapolated_to_and_beyond_
 def test_projection_of_rough_states_closes_the_joints():
     """The exact state of the five-bar at 4 ms gets random errors of 1e-4 (ROUGH) and is projected. By the
     judge's equations its joints are then closed to rounding, and their rates are at most ten times the
-    measured 4.4e-14 m/s. It stays within ten times ROUGH of the exact state."""
+    measured 4.4e-14 m/s. The result is within 10 ROUGH of the exact state."""
     scene, t = SCENES["five_bar"](), 0.004
     rng = np.random.default_rng(1)
     coordinates, rates = true_nodes(scene, np.array([t]))[1][:2, 0]

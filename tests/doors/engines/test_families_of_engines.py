@@ -46,7 +46,7 @@ def ticks(name, scene, setting, patch):
 
 
 def test_cost_of_a_run_of_a_files_own_model_is_cpu_time(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """MuJoCo runs the MJCF file's model. By the clock of `ticks` it builds for 1 s and steps for 3 s."""
+    """MuJoCo runs the MJCF file's model. By the clock of `ticks` building takes 1 s, stepping 3 s."""
     pendulum = '<body name="b"><joint type="hinge" axis="0 1 0"/><geom size="0.1" pos="0 0 -1"/></body>'
     path = tmp_path / "pendulum.xml"
     path.write_text(f"<mujoco><worldbody>{pendulum}</worldbody></mujoco>")

@@ -39,8 +39,8 @@ def known(name: str, scenes: tuple[str, ...]) -> set[tuple[str, str, str]]:
 
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_built_in_engine_violates_no_check_on_six_probes(name):
-    """All of the 19 checks pass that apply to a probe (QUICK): momentum does not where a joint is at the
-    ground, energy not with a damper or driver. Exudyn has no accelerations and reactions with drivers, so
+    """All of the 19 checks pass that apply to a probe (QUICK): momentum does not apply with a joint at
+    the ground, energy not with a damper or driver. Exudyn has no accelerations and reactions with drivers, so
     that three more checks do not apply."""
     for scene in QUICK:
         found = {verdict.property: verdict.status for verdict in verdicts(name, scene, related=False)}
