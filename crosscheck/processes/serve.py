@@ -29,7 +29,7 @@ from crosscheck.engine import Cannot, Engine, Owner, Setting, engine
 from crosscheck.processes.answer import answered
 from crosscheck.refusals import shortened
 from mbref.motions.trajectory import Outcome, Trajectory
-from mbref.scene import Scene
+from mbref.scene import Scene, SceneError
 
 Job = tuple[str, Setting]  # engine name and setting
 Capabilities = tuple[str, Cannot | None, list[Setting]]
@@ -194,6 +194,8 @@ def _answer(function: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
     try:
         with warnings.catch_warnings():  # reset the filter, so that each call warns again
             return pickle.dumps((True, function(*arguments)))
+    except SceneError as error:
+        return pickle.dumps((False, shortened(str(error))))
     except Exception as error:  # the parent turns the message into an Outcome
         return pickle.dumps((False, shortened(traceback.format_exception_only(error)[-1].strip())))
     finally:

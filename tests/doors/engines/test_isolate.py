@@ -15,6 +15,7 @@ from crosscheck.engine import Setting
 from crosscheck.processes.child import ChildFailed, stop_all
 from crosscheck.processes.interrupts import calls_ended
 from crosscheck.processes.pool import (
+    apart,
     ask,
     capabilities,
     end_idle,
@@ -26,8 +27,10 @@ from crosscheck.processes.pool import (
 )
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
+from mbref.scene.structure import refuse_intervals
 from mbref.scenes import SCENES
 from tests.helpers.fake_engines import FAKES, CompilingModels, converse
+from tests.helpers.intermittent_mechanisms import intermittent_mechanism
 from tests.helpers.processes import is_gone
 from tests.helpers.still_engines import resting as still
 
@@ -261,6 +264,12 @@ def test_timing_beyond_its_cpu_time_ends_after_one_repeat_and_reports_each_round
     scene = still(str(tmp_path / "log"))
     found = time_interleaved(scene, TIMES, jobs, 5, 60.0, lambda: rounds.append(1), most_seconds=0.0)
     assert found == [[0.5]] and len(rounds) == 2
+
+
+def test_fault_of_a_scene_in_another_process_is_told_without_its_class():
+    """Equations of a mechanism whose joints come and go are refused by the joint's name."""
+    with pytest.raises(ChildFailed, match=r"^\w+\[.*: only motions have intervals"):
+        apart(refuse_intervals, (intermittent_mechanism(1),), 60.0)
 
 
 def test_a_crash_among_interleaved_runs_is_raised_with_its_signal():
