@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -65,11 +66,14 @@ def _loaded(file: Path, named: Path) -> dict[Identity, Record]:
         )
     checked(file, records)
     found: dict[Identity, Record] = {}
-    for record in _of_the_report(file, records):
+    ours = _of_the_report(file, records)
+    for record in ours:
         timed = times.get(record["key"]) or record["cost"]
         cost = {**record["cost"], "seconds": timed["seconds"]}
         found[identity(record)] = {**record, "cost": cost, "repeated": record["key"] in times}
-    return found
+    pairs = {(record["scene"], record.get("mechanism")) for record in ours}
+    counts = Counter(scene for scene, mechanism in pairs if mechanism is not None)
+    return {k: {**record, "mechanisms": counts[record["scene"]]} for k, record in found.items()}
 
 
 def _of_the_report(file: Path, records: Sequence[Record]) -> Sequence[Record]:
@@ -120,6 +124,7 @@ def circumstances(old: Mapping[Identity, Record], new: Mapping[Identity, Record]
     both = [(old[name], new[name]) for name in new if name in old]
     others = dict.fromkeys(b["scene"] for a, b in both if _is_other_mechanism(a, b))
     unnamed = dict.fromkeys(b["scene"] for a, b in both if not (a.get("mechanism") and b.get("mechanism")))
+    several = dict.fromkeys(r["scene"] for each in both for r in each if r.get("mechanisms", 1) > 1)
     untimed = sum(a["machine"] != b["machine"] for a, b in both if not _is_other_mechanism(a, b))
     return [
         *(
@@ -129,6 +134,10 @@ def circumstances(old: Mapping[Identity, Record], new: Mapping[Identity, Record]
         ),
         *(f"{scene}: the mechanism was changed, so its runs are not compared." for scene in others),
         *(f"{scene}: records name no mechanism, so it may have changed unseen." for scene in unnamed),
+        *(
+            f"{scene}: a set has several mechanisms of this name; the last record of a request is compared."
+            for scene in several
+        ),
         *([f"Times of {runs(untimed)} are not compared: the machines differ."] if untimed else []),
     ]
 

@@ -106,6 +106,7 @@ def test_records_of_another_version_of_a_scene_are_left_out(tmp_path):
     named = zip(("k1", "k2"), (scene, heavier), strict=True)
     place = stored(tmp_path, *({"key": key, "mechanism": mechanism(each)} for key, each in named))
     assert [record["key"] for record in load(place).values()] == ["k2"]
+    assert "s: a set has several mechanisms of this name" in circumstances(load(place), load(place))[0]
     (place / "scenes").mkdir()
     scene.save(place / "scenes" / "s.toml")
     assert [record["key"] for record in load(place).values()] == ["k1"]
