@@ -153,12 +153,12 @@ def untimed(records: list[dict]) -> list[dict]:
     ],
     ids=["family", "engine", "scene", "fewer times", "times", "options", "engine with threads"],
 )
-def test_key_depends_on_all_of_a_case_except_its_time_limit(other: Case, monkeypatch: pytest.MonkeyPatch):
-    """A case that differs from "a" in the part of its id has another key; records are found by their keys."""
+def test_key_depends_on_all_of_a_case_except_its_limits_of_time(other: Case, monkeypatch):
+    """A case that differs from "a" in the part of its id has another key. Limits are of run and reference."""
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     assert key(other) != key(case("a"))
-    assert key(other) == key(other._replace(time_limit=1.0))
+    assert key(other) == key(other._replace(time_limit=1.0, reference_time=2.0))
 
 
 def test_default_cases_are_the_settings_of_engines_that_map_the_scene():

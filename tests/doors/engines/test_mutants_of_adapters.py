@@ -77,8 +77,8 @@ def package(way: str) -> str:
 
 @functools.cache
 def case(way: str) -> tuple[Scene, Truth]:
-    """A mechanism that turns, and its truth: every joint and most loads, with two loops, if the engine maps
-    them. OndselSolver maps mechanisms whose whole motion is driven. The code of MJX, Warp and generators is
+    """A mechanism that turns, and its truth: seven types of joints, four of loads and two loops, if they are
+    mapped. OndselSolver maps mechanisms whose whole motion is driven. Code of MJX, Warp and generators is
     compiled for each model, so that theirs is small; generators map moments alone."""
     if way == "ondsel":
         scene = SCENES["spatial_slider_crank_driven"]().with_(duration=0.1)

@@ -18,7 +18,7 @@ from tests.helpers.measured import MARGIN
 ENGINES = ("mujoco", "pinocchio", "exudyn")
 # largest error of accelerations on 124 mechanisms, times their distance to a singular position
 MEASURED = {"mujoco": 4.8e-10, "pinocchio": 1.7e-13, "exudyn": 2.1e-8, PRINCIPLE: 9.3e-14}
-SOME = (1, 3, 9, 10, 15, 16)  # every joint type, one to three loops; the last is near a singular position
+SOME = (1, 3, 9, 10, 15, 16)  # all of KINDS, one to three loops; the last is near a singular position
 
 
 @functools.cache
@@ -35,14 +35,14 @@ def excess(seeds: Sequence[int]) -> float:
 
 @pytest.mark.parametrize("seeds", [SOME, pytest.param(range(200), marks=pytest.mark.slow)], ids=["6", "200"])
 def test_engines_accelerate_random_mechanisms_as_mbref(seeds):
-    """Initial accelerations by three engines and by Gauss's principle; every joint type, one to three loops.
+    """Initial accelerations by three engines and Gauss's principle; joints of KINDS, one to three loops.
     ``excess`` is the largest difference from mbref over ten times the measured one of the engine, which grows
     near singular positions as the reciprocal of their distance."""
     assert excess(seeds) <= 1
 
 
-def test_random_mechanisms_have_every_joint_type_and_up_to_three_loops():
-    """Mechanisms of 40 seeds have 3 to 8 bodies; each joint that a spanning tree leaves out closes a loop."""
+def test_random_mechanisms_have_eight_joint_types_and_up_to_three_loops():
+    """40 seeds have 3 to 8 bodies and all KINDS of joints; each joint beyond a tree's ones closes a loop."""
     scenes = [random_mechanism(seed) for seed in range(40)]
     kinds = Counter(joint.type for scene in scenes for joint in scene.joint)
     assert set(kinds) == set(KINDS), f"no {set(KINDS) - set(kinds)}"

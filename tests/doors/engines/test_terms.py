@@ -60,7 +60,7 @@ LIGHT = 1.1e-10  # measured: accelerations of a hub of 200 kg with a body of 0.7
 
 @pytest.mark.parametrize("name", [if_installed("drake"), if_installed("dart")])
 def test_terms_of_drake_and_dart_give_gauss_s_accelerations(name: str) -> None:
-    """The scenes have every joint, driver and load between moving bodies. Accelerations at the start differ
+    """The scenes have all types of drivers, loads and joints, except free ones. First accelerations differ
     by at most 1e-12 of the largest: rounding, which the ratio of masses magnifies to 1e-9 in one scene."""
     for label, scene in scenes().items():
         run = simulate(name, scene, TERMS, 0.0)

@@ -1,4 +1,4 @@
-"""Engines on scenes with every joint, driver and load, and on an overconstrained loop, against the judge."""
+"""Engines on seven types of joints, four of loads, drivers and an overconstrained loop, against the judge."""
 
 import functools
 
@@ -90,7 +90,7 @@ def pendulums() -> dict[str, Scene]:
 
 
 def chain_scenes() -> dict[str, Scene]:
-    """Every joint kind between many bodies, and loops cut at joints of every kind."""
+    """Seven types of joints between many bodies, and loops cut at joints of four types."""
     backwards = every_joint(name="backwards", body=tuple(reversed(BODIES)), joint=tuple(reversed(JOINTS)))
     rings = {f"ring {kind}": ring(kind) for kind in ("revolute", "cylindrical", "universal", "spherical")}
     return {"every joint": every_joint(), "driven": driven(), "backwards": backwards, **rings}

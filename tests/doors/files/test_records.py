@@ -36,7 +36,7 @@ def test_last_record_of_a_key_replaces_earlier_ones(tmp_path: Path):
 
 
 def test_lines_that_are_no_records_are_reported_by_number_and_kept(tmp_path, capsys):
-    """Text, a key that is no text, NaN, a list, and brackets too deep for a parser, between two records."""
+    """Text, a key that is no text, NaN and a list between two records; then brackets too deep to parse."""
     path = tmp_path / "runs.jsonl"
     middle = ["notes", '{"key": 1}', '{"key": "n", "x": NaN}', "[1]"]
     lines = ['{"key": "a"}', *middle, '{"key": "b"}', "[" * 9000]
