@@ -35,8 +35,7 @@ def test_exact_motions_of_a_scene_pass_the_comparison_with_and_without_accelerat
 
 def test_a_run_with_missing_samples_is_reported():
     """The comparison needs two samples; the second run has one of them, then none."""
-    scene = FOUR_BAR
-    run = short_run(scene)
+    scene, run = FOUR_BAR, short_run(FOUR_BAR)
     found = gate(scene, [run, short_run(scene, np.zeros(1))])
     assert found is not None and found.field == "samples reached", found
     assert gate(scene, [run, short_run(scene, np.zeros(0))]).field == "samples reached"
@@ -44,8 +43,7 @@ def test_a_run_with_missing_samples_is_reported():
 
 def test_a_rotated_body_is_reported_with_its_angle():
     """The unturned coupler gets the quaternion (cos 1e-6, 0, 0, sin 1e-6), a turn by 2e-6 rad."""
-    scene = FOUR_BAR
-    run = short_run(scene)
+    scene, run = FOUR_BAR, short_run(FOUR_BAR)
     orientation = run.orientation.copy()
     orientation[0, 1] = [np.cos(1e-6), 0, 0, np.sin(1e-6)]
     found = gate(scene, [run, replace(run, orientation=orientation)])
