@@ -99,10 +99,10 @@ def test_upright_disc_falls_or_oscillates_as_routh_says(spin):
     """The lean θ obeys (A + m R²) θ'' = m g R θ - k (θ - θ0), k = C (C + m R²) n² / A for the spin n, to 1e-6
     of itself, as it is small (TINY): above √(g / 3 R) = 3.3 rad/s it oscillates."""
     start = disc(np.pi / 2 - TINY, spin * np.array([np.cos(TINY), 0.0, np.sin(TINY)]))
-    motion = mbref.simulate(start, times=np.linspace(0.0, 0.6, 7), rtol=1e-12)
+    motion = mbref.simulate(start, times=(times := np.linspace(0.0, 0.6, 7)), rtol=1e-12)
     stiff = AXIAL * (AXIAL + MASS * R**2) * spin**2 / ACROSS - MASS * G * R
     middle = (1 + MASS * G * R / stiff) * TINY
-    swing = np.cos(np.sqrt(complex(stiff / (ACROSS + MASS * R**2))) * motion.times).real
+    swing = np.cos(np.sqrt(complex(stiff / (ACROSS + MASS * R**2))) * times).real
     lean = np.arcsin(rotations.rotate(motion.orientation[:, 0], np.array(Z))[:, 2])
     assert lean == pytest.approx(middle + (TINY - middle) * swing, rel=1e-6)
 
@@ -115,7 +115,7 @@ def test_wheel_rolls_down_an_incline(share):
     pull = (G * np.sin(0.4), 0.0, -G * np.cos(0.4))
     scene = Scene(name="slope", gravity=pull, body=[wheel], joint=[tread("slope", "ground", "wheel", TOP)])
     motion = mbref.simulate(scene, times=[0.0, 0.5, 1.0], rtol=1e-11)
-    assert motion.position[:, 0, 0] == pytest.approx(pull[0] / (1 + share) * motion.times**2 / 2, rel=1e-10)
+    assert motion.position[1:, 0, 0] * (1 + share) == pytest.approx([pull[0] / 8, pull[0] / 2], rel=1e-10)
     assert motion.reactions["slope"][:, 0] * (1 + share) == pytest.approx(-MASS * pull[0] * share, rel=1e-10)
 
 
