@@ -187,22 +187,23 @@ def test_an_engine_without_its_package_is_left_out_with_the_command_that_install
 
 @pytest.mark.parametrize("what", ["scenes", "engines", "methods", "settings", "metrics"])
 def test_list_names_every_scene_engine_method_setting_and_metric(capsys, what):
-    """The names are those of the packages' registries; settings are the families of all engines."""
+    """Methods are formulations, stabilisations and integrators, and settings are the engines' families."""
     from crosscheck.engine import engine, engine_names
     from crosscheck.judge.metrics import METRICS
     from mbref.formulations import FORMULATIONS
+    from mbref.integrators import INTEGRATORS
+    from mbref.stabilisation import STABILISATIONS
 
     known = {
         "scenes": SCENES,
         "engines": engine_names(),
-        "methods": FORMULATIONS,
+        "methods": (*FORMULATIONS, *STABILISATIONS, *INTEGRATORS),
         "metrics": METRICS,
         "settings": [family for name in engine_names() for family in engine(name).families],
     }[what]
     status, out, _ = run_main(capsys, "list", what)
-    assert status == 0
     listed = "".join(out.split())  # columns may break a name
-    assert [name for name in known if "".join(name.split()) not in listed] == [], out
+    assert status == 0 and [name for name in known if "".join(name.split()) not in listed] == [], out
 
 
 @pytest.mark.parametrize("name", COMMANDS)
