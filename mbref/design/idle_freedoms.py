@@ -16,6 +16,7 @@ from mbref.equations.offsets import assembled
 from mbref.linear_algebra.least_norm import null_space
 from mbref.motions.constraints import without_armatures
 from mbref.scene import Scene
+from mbref.scene.rolling import RollingWheel
 from mbref.scenes import find_scene
 
 FREE = 1e-9  # singular value of a link's columns of unit rows / largest one, below which it moves alone
@@ -89,10 +90,13 @@ def _sentence(model: Model, q: np.ndarray, link: list[str], joints: list[str]) -
         return ""
     if twists.shape[1] > 1:
         return f"{names} can move alone in {twists.shape[1]} ways between its joints and {verb} nothing else"
-    if any(model.scene.joint_named(joint).facts.velocity_rows for joint in joints):
-        return f"{names} can roll and {verb} nothing else"
     velocity, spin = np.split(twists[:, 0], 2)
     rate = float(np.linalg.norm(spin))
+    treads = [each for each in map(model.scene.joint_named, joints) if isinstance(each, RollingWheel)]
+    if any(np.linalg.norm(np.cross(spin, rotations.unit(each.normal))) > AXIAL * rate for each in treads):
+        return f"{names} can roll and {verb} nothing else"
+    if treads:
+        return f"{names} can turn about the normal of a contact and {verb} nothing else"
     if rate < AXIAL:
         return f"{names} can slide between its joints and {verb} nothing else"
     if abs(velocity @ spin) > AXIAL * rate**2:

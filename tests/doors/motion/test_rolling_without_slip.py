@@ -159,6 +159,9 @@ def test_board_on_a_fixed_log_keeps_its_energy():
     upright = joint("upright", "planar", "ground", "board", axis=Y)
     scene = Scene(name="board", gravity=(0.0, 0.0, -G), body=[board], joint=[log, upright])
     assert mbref.idle_freedoms(scene) == ["board can roll and moves nothing else"]
+    board["angular_velocity"] = [0.0, 0.0, 0.9]
+    flat = Scene(name="flat", body=[board], joint=[log, joint("table", "planar", "ground", "board", axis=Z)])
+    assert "board can turn about the normal of a contact" in mbref.idle_freedoms(flat)[0]
     motion = mbref.simulate(scene, times=TIMES, rtol=1e-11)
     lean = 2 * np.arctan2(motion.orientation[:, 0, 2], motion.orientation[:, 0, 0])
     kinetic = (0.5 + 2.0 * R**2 * lean**2) * motion.angular_velocity[:, 0, 1] ** 2 / 2
