@@ -1,10 +1,9 @@
 """Plant drawn mutants one at a time in a copy of the sources, and see whether a test of the line fails.
 ``python -m tests.mutants --seed 1 --count 50`` draws so many places of the syntax trees of the packages, and
-prints a line for each, the numbers of killed mutants by folder, and the lines that survive. ``--only
-mbref/taylor crosscheck/judge`` draws from these paths alone; ``--list`` runs nothing. Tests run as plain
-Python. Once for each test its lines are recorded in ``build/mutants``. Against a mutant run the tests that
-run its line, until a test fails or 60 CPU s are over (``--budget``): first the quick tests that run few other
-lines. This is a tool to find cases that the tests lack: a mutant survives where no test shows the difference,
+prints a line for each, the numbers of killed mutants by folder, and the lines that survive. Tests run as
+plain Python. Once for each test its lines are recorded in ``build/mutants``. Against a mutant run the tests
+that run its line, until a test fails or 60 CPU s are over: first the quick tests that run few other lines.
+This is a tool to find cases that the tests lack: a mutant survives where no test shows the difference,
 or where the line makes none."""
 
 import argparse
