@@ -30,13 +30,8 @@ def commands(block: str) -> list[str]:
 
 
 def filled(text: str) -> str:
-    """Return a page with the present output under each command; its commands run in one new folder.
-
-    Raises
-    ------
-    RuntimeError
-        A command printed nothing.
-    """
+    """Return a page with the present output under each command; its commands run in one new folder. Raises
+    RuntimeError if a command printed nothing."""
     with tempfile.TemporaryDirectory() as folder:
         text = BLOCK.sub(lambda block: f"```console\n{_transcript(block[1], Path(folder))}```", text)
         return PYTHON.sub(lambda found: _shown(found[1], Path(folder)), text)

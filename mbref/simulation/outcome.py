@@ -271,7 +271,7 @@ def _cause(run: Run, status: int) -> str:
         return f"{OUTCOMES[status].sentence}, as a run by another method shows, by t = {t:.6g} s"
     if flat := lying_wheel(run):
         return f"the wheel of joint {flat!r} lies flat on its plane, at t = {t:.6g} s"
-    return f"{OUTCOMES[status].sentence} at t = {t:.6g} s ({_failed_part(run, status)})"
+    return f"{OUTCOMES[status].sentence} at t = {t + run.stepper.ahead:.6g} s ({_failed_part(run, status)})"
 
 
 def _failed_part(run: Run, status: int) -> str:

@@ -16,6 +16,8 @@ from mbref.stepping.run import NEARLY, Run
 class ExplicitStepper:
     """The steps of one run by the kernels of its method."""
 
+    ahead = 0.0  # unknown: explicit steps do not look ahead
+
     def __init__(self, run: Run):
         self.run = run
         self._pace = Pace(run)

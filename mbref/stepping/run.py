@@ -42,7 +42,12 @@ NEARLY = 1e-5  # smallest singular value below which rows are nearly dependent
 
 
 class Stepper(Protocol):
-    """Interface of the stepping loop of a run, by an explicit integrator or by a Taylor series."""
+    """Interface of the stepping loop of a run, by an explicit integrator or by a Taylor series.
+
+    ``ahead`` is the time (s) from the end of an UNDECIDED run to the singular position; 0 if it is unknown.
+    """
+
+    ahead: float
 
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
         """Run to the end; return the final status and the process CPU time of the stepping alone (s).

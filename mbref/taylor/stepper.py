@@ -48,6 +48,7 @@ class SeriesStepper:
         self._pooled = acquire_memory(run, self.geometry, self.polynomials, self._options.accurate_order)
         self.taylor, self.argument = self._pooled.values, self._pooled.packed.argument
         self._calls, self._sampling = 0, 0.0  # calls that advance the run; s of CPU time for samples
+        self.ahead = 0.0
         self._put_options()
         self._branches = BranchFollower(run, self.taylor, self.argument, self.expand)
         self._wants_code = run.limits.code == AUTO
@@ -146,7 +147,9 @@ class SeriesStepper:
     def take_steps(self) -> int:
         """Take the steps of one call; return PAUSED, DONE at the end, or the failure status."""
         self._calls += 1
-        return int(self._take(self.argument))
+        status = int(self._take(self.argument))
+        self.ahead = float(self.taylor.distance.time_to_crossing) if status == UNDECIDED else 0.0
+        return status
 
     def expand(self) -> int:
         """Expand at the present time and state, for steps until the end; return OK or the failure status."""

@@ -1,9 +1,7 @@
-"""Engines whose derivatives of accelerations have one fault, in the twists of the bodies as coordinates.
-
-The acceleration and the multipliers solve M a + Jᵀ λ = f and J a + J̇ v + 2 β J v + β² Φ = 0; derivatives
-solve the same matrix, with the changes of all terms at constant a and λ on the right.  A fault changes terms,
-columns, the rows that are solved, or the result.
-"""
+"""Engines whose derivatives of accelerations have one fault, in the twists of the bodies as coordinates. The
+acceleration and the multipliers solve M a + Jᵀ λ = f and J a + J̇ v + 2 β J v + β² Φ = 0; derivatives solve
+the same matrix, with the changes of all terms at constant a and λ on the right. A fault changes terms,
+columns, the rows that are solved, or the result."""
 
 import functools
 from collections.abc import Mapping, Sequence
