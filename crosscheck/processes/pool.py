@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import atexit
 import os
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from functools import partial
@@ -160,7 +161,7 @@ def time_interleaved(
     kernels. The same child times the next scene. A run that does not complete has NaN. A job that takes more
     than FAR_BEHIND times as long as the fastest one has one repeat. A further repeat begins only before all
     runs have taken ``most_seconds`` of CPU time, with what is not stepping, such as a search for events.
-    ``time_limit`` (s) is for all jobs of a round together. Raises ChildFailed if the child gives no result,
+    ``time_limit`` (s) is for all rounds together. Raises ChildFailed if the child gives no result,
     LookupError for an unknown engine.
     """
     for engine_name, _ in jobs:
@@ -169,11 +170,12 @@ def time_interleaved(
     with _in_use(EVERY_ENGINE, instead=jobs[0][0]) as child:
 
         def a_round(chosen: Sequence[int]) -> list[tuple[float, float]]:
-            asked = scene, times, [jobs[k] for k in chosen]
-            rows: list[tuple[float, float]] = child.call(serve.run_round, asked, time_limit).value
+            asked, left = (scene, times, [jobs[k] for k in chosen]), max(0.0, end - time.monotonic())
+            rows: list[tuple[float, float]] = child.call(serve.run_round, asked, left).value
             after_round()
             return rows
 
+        end = time.monotonic() + time_limit
         warm = a_round(range(len(jobs)))
         spent = sum(whole for _, whole in warm)
         limit = FAR_BEHIND * min((s for s, _ in warm if s > 0.0), default=float("inf"))
