@@ -23,7 +23,7 @@ from crosscheck.judge.energy import energy_series
 from crosscheck.judge.gauss_principle import stacked
 from crosscheck.judge.metrics import in_scene_order
 from crosscheck.judge.momentum import momentum_series
-from crosscheck.judge.openings import counted_violation, opening
+from crosscheck.judge.openings import counted_violation, uncounted_couplings
 from crosscheck.judge.precision import motion_rate
 from crosscheck.judge.reaction_balance import balance, idle
 from crosscheck.judge.tolerances import GRAINS, LIKE_TRUTH, REACTIONS, SAME_MOTION, STAYS_CLOSED, UNIT_NORM
@@ -70,7 +70,7 @@ def unit_orientations(bench: Bench) -> Finding:
 
 def closure(bench: Bench) -> Finding:
     """Joints and drivers hold at every sample, by the judge's own joint equations."""
-    uncounted = opening(bench.scene, bench.motion).uncounted
+    uncounted = uncounted_couplings(bench.scene, bench.motion)
     remark = f"turns of {listed(uncounted)} cannot be counted between samples" if uncounted else ""
     return vanishing(bench, lambda k: counted_violation(bench.scene, bench.sweep[k]), STAYS_CLOSED, remark)
 

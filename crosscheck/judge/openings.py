@@ -39,11 +39,16 @@ def opening(scene: Scene, run: Trajectory) -> Opening:
     return Opening(max(gaps), max(angles), tuple(dict.fromkeys(chain.from_iterable(uncounted))))
 
 
+def uncounted_couplings(scene: Scene, run: Trajectory) -> tuple[str, ...]:
+    """Return the names of the couplings of a run whose turns cannot be counted."""
+    return opening(scene, run).uncounted if scene.coupling else ()
+
+
 def counted_violation(scene: Scene, run: Trajectory) -> float:
     """Return the largest residual of a run, without couplings whose turns cannot be counted."""
-    uncounted = opening(scene, run).uncounted
-    couplings = [each for each in scene.coupling if each.name not in uncounted]
-    return float(violation_series(scene.with_(coupling=couplings), run).max(initial=0.0))
+    if uncounted := uncounted_couplings(scene, run):
+        scene = scene.with_(coupling=[each for each in scene.coupling if each.name not in uncounted])
+    return float(violation_series(scene, run).max(initial=0.0))
 
 
 def _of_piece(scene: Scene, run: Trajectory) -> Opening:
