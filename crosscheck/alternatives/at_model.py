@@ -24,7 +24,7 @@ from mbref.scene import Scene
 
 WAY_SECONDS = 5.0  # CPU seconds for one way; slower ways are left out
 ENGINE_SECONDS = (
-    10.0  # CPU seconds for all ways of an engine, and also of waiting; a slower engine is left out
+    10.0  # CPU seconds, and seconds of waiting, for all ways of an engine; a slower one is left out
 )
 AT_START = (ACCELERATION, FORCE)
 

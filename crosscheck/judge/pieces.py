@@ -90,8 +90,8 @@ def at_start(scene: Scene) -> Scene:
 
 
 def always_held(scene: Scene) -> Scene:
-    """Return a scene with the joints that hold at all times, and without drivers and couplings, for numbers
-    that need no other constraint; without intervals, conditions and stops the scene itself."""
+    """Return a scene that has only the joints that hold at all times, without drivers and couplings. A scene
+    without intervals, conditions and stops is returned as it is."""
     if not has_pieces(scene):
         return scene
     joints = [permanent(joint) for joint in scene.joint if joint.is_permanent]

@@ -27,7 +27,7 @@ def test_way_with_too_much_gravity_is_named_beside_the_way_that_gauss_principle_
 
 
 def test_compare_shows_solvers_that_differ():
-    """The same stone: the comparison's text and its document have the pair."""
+    """The comparison prints the pair, and its document contains it; the mechanism is the one above."""
     found = crosscheck.compare(STONE, [SEVERAL], samples=3)
     assert "Solvers differ: " in str(found)
     (pair,) = found.document()["disagreements"]

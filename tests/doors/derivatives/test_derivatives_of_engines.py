@@ -193,7 +193,7 @@ def test_known_defects_of_pinocchios_derivatives_are_found(capsys):
 @pytest.mark.slow
 @pytest.mark.skipif(not installed("mujoco"), reason="needs MuJoCo")
 def test_mujoco_differentiates_its_own_step_and_is_rough_about_the_exact_motion(loop, capsys):
-    """Its closures are soft: derivatives of a step are right, those of a rigid loop off by over 1e-7."""
+    """MuJoCo has soft closures: derivatives of its step are right; a rigid loop's differ by over 1e-7."""
     main(["derivatives", "mujoco", loop, "--json"])
     found = json.loads(capsys.readouterr().out)
     rows = {(row["truth"], row["function"]): [] for row in found["rows"]}
