@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.judge.full_turns import counted_poses
 from crosscheck.judge.metrics import exact_motion
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.tolerances import ERROR_LEVELS, EXCESS, FALSE_SUCCESS
@@ -159,13 +160,13 @@ class SceneRuns:
         None if unknown."""
         truth = self._truth()
         try:
-            return None if truth is None else truth.poses(times)
+            return None if truth is None else counted_poses(self.scene, truth, times)
         except NoSolution:
             return None
 
     def exact_part(self, motion: Trajectory) -> Trajectory | None:
         """Return the true motion at a motion's times, up to the time to which the truth is known."""
-        return exact_motion(motion, self._truth())
+        return exact_motion(self.scene, motion, self._truth())
 
     def _truth(self) -> Truth | None:
         return truth_for(self.scene, SECONDS if self.truth is None else self.truth["given"])

@@ -61,10 +61,16 @@ def from_coordinate(coupling: Coupling, moved: float) -> Coupling:
     return coupling.model_copy(update={"polynomial": tuple(found)})
 
 
+def bent_couplings(scene: Scene) -> list[Coupling]:
+    """Return the couplings whose polynomials depend on the full turns of an angle."""
+    return [c for c in scene.coupling if c.powers > 1 and scene.coupled(c)[0][1] == ANGLE]
+
+
 def unwound(scene: Scene, motion: Trajectory) -> list[Scene]:
     """Return for each sample the scene whose couplings act alike at angles within half a turn, which a pose
-    gives: polynomials of angles count from the full turns at this sample."""
-    bent = [c for c in scene.coupling if c.powers > 1 and scene.coupled(c)[0][1] == ANGLE]
+    gives: polynomials of angles count from the full turns at this sample. They are NaN where full turns
+    cannot be counted."""
+    bent = bent_couplings(scene)
     if not bent or not len(motion.times):
         return [scene] * len(motion.times)
     pose = with_ground(motion.position, motion.orientation)
@@ -72,9 +78,10 @@ def unwound(scene: Scene, motion: Trajectory) -> list[Scene]:
     turns = []
     for coupling in bent:
         angle = coordinates(joints[coupling.joints[0]], motion.times, *pose, spins, motion.angles)[:, 0]
-        turns.append(np.round(np.nan_to_num(angle) / (2 * np.pi)))
+        turns.append(np.round(angle / (2 * np.pi)))
     found: dict[tuple[float, ...], Scene] = {(0.0,) * len(bent): scene}
-    keys = [tuple(row) for row in np.array(turns).T.tolist()]
+    uncounted = np.isnan(turns).any(axis=0)
+    keys = [tuple(row) for row in np.where(uncounted, np.inf, turns).T.tolist()]
     for key in keys:
         if key not in found:
             found[key] = _counted_from(scene, {c.name: 2 * np.pi * n for c, n in zip(bent, key, strict=True)})
@@ -82,5 +89,6 @@ def unwound(scene: Scene, motion: Trajectory) -> list[Scene]:
 
 
 def _counted_from(scene: Scene, moved: Mapping[str, float]) -> Scene:
-    couplings = [from_coordinate(each, moved.get(each.name, 0.0)) for each in scene.coupling]
+    with np.errstate(invalid="ignore"):  # a law about an unknown angle is NaN
+        couplings = [from_coordinate(each, moved.get(each.name, 0.0)) for each in scene.coupling]
     return scene.with_(coupling=couplings)

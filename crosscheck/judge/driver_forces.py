@@ -27,7 +27,7 @@ def driver_forces(scene: Scene, exact: Trajectory) -> dict[str, np.ndarray]:
     """Return the force (N) or torque (N m) (k,) of each driver, by its joint.
 
     The torque accelerates the armature of the joint too, and contains what couplings transmit. It is NaN at
-    samples at which redundant constraints do not determine it.
+    samples at which redundant constraints do not determine it, or full turns of a coupling cannot be counted.
 
     Raises ValueError if the motion has no accelerations.
     """
@@ -49,8 +49,11 @@ def _multipliers(scene: Scene, exact: Trajectory, k: int, push: np.ndarray) -> n
     state = exact.position[k], exact.orientation[k], exact.velocity[k], exact.angular_velocity[k]
     twist_rates = np.hstack([exact.acceleration[k], exact.angular_acceleration[k]]).ravel()
     rotors = reflected(scene, *state)
+    rows = jacobian(scene, float(exact.times[k]), *state[:2])[0]
+    if np.isnan(rows).any():
+        return np.full(len(rows), np.nan)
     total = push + rotors.mass @ twist_rates - rotors.force
-    rows, units, sizes = unit_rows(scene, jacobian(scene, float(exact.times[k]), *state[:2])[0])
+    rows, units, sizes = unit_rows(scene, rows)
     u, s, vt = np.linalg.svd(rows, full_matrices=False)
     rank = int((s > RANK * s[0]).sum())
     u = u[:, :rank]

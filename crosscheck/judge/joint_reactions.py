@@ -60,8 +60,8 @@ def shared_wrenches(
     scene: Scene, t: float, position: np.ndarray, orientation: np.ndarray, rank: float = RANK
 ) -> dict[str, np.ndarray]:
     """Return for each joint an orthonormal basis (6, k) of the wrenches that redundancy leaves undetermined;
-    k = 0 if the reaction is unique. A wrench is a force and a moment over the scene's length, in world axes,
-    on the second body at its anchor.
+    k = 0 if the reaction is unique, 6 where the law of a coupling is not known. A wrench is a force and a
+    moment over the scene's length, in world axes, on the second body at its anchor.
 
     ``position`` (nb, 3) and ``orientation`` (nb, 4) are one pose at time t (s). The pose must satisfy the
     joints so accurately that singular values below ``rank`` times the largest singular value count as zero.
@@ -78,6 +78,8 @@ def _shared(
     position = np.frombuffer(positions).reshape(-1, 3)
     orientation = np.frombuffer(orientations).reshape(-1, 4)
     rows, _ = jacobian(scene, t, position, orientation)
+    if np.isnan(rows).any():
+        return {joint.name: np.eye(6) for joint in scene.joint}
     arms, found = np.repeat([1.0, scene_length(scene)], 3), {}
     scaled_rows, _, sizes = unit_rows(scene, rows)
     u, s, _ = np.linalg.svd(scaled_rows)

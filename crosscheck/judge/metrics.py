@@ -15,6 +15,7 @@ import numpy as np
 
 from crosscheck.judge import constraints, events
 from crosscheck.judge.energy import energy_series
+from crosscheck.judge.full_turns import counted_poses
 from crosscheck.judge.joint_reactions import SAMPLES, compare
 from crosscheck.judge.pieces import has_pieces
 from crosscheck.judge.reaction_balance import with_exact_reactions
@@ -23,7 +24,7 @@ from crosscheck.judge.tolerances import LEAST_ORDER, ROUNDING, STRAIGHT_LINE
 from crosscheck.judge.truth import NoSolution, Truth
 from crosscheck.judge.violations import violation_series
 from mbref import rotations
-from mbref.motions.trajectory import Trajectory
+from mbref.motions.trajectory import PER_BODY, Trajectory
 from mbref.scene import Scene
 
 MANY = 50  # bodies; the comparison of reactions is left out for more, because it would take too long
@@ -81,7 +82,7 @@ def measure(scene: Scene, trajectory: Trajectory, truth: Truth | None = None) ->
         If the bodies differ from the bodies of the scene.
     """
     scene, trajectory = started(scene), in_scene_order(scene, trajectory)
-    exact = exact_motion(trajectory, truth)
+    exact = exact_motion(scene, trajectory, truth)
     with np.errstate(all="ignore"):  # metrics report states that are not finite, without warnings
         pieces = list(events.parts(scene, trajectory, exact))
         found = {
@@ -97,17 +98,17 @@ def measure(scene: Scene, trajectory: Trajectory, truth: Truth | None = None) ->
     return found | {"error_bound": bound, "error_until": float(exact.times[-1])}
 
 
-def exact_motion(trajectory: Trajectory, truth: Truth | None) -> Trajectory | None:
-    """Return the truth at a trajectory's times; if the truth ends early, at the first of these times. None
-    without a truth, or if the truth is known at the start only.
+def exact_motion(scene: Scene, trajectory: Trajectory, truth: Truth | None) -> Trajectory | None:
+    """Return the truth at a trajectory's times, with full turns counted; if the truth ends early, at the
+    first of these times. None without a truth, or if the truth is known at the start only.
     """
     if truth is None:
         return None
     try:
-        return truth.poses(trajectory.times)
+        return counted_poses(scene, truth, trajectory.times)
     except NoSolution as end:
         known = trajectory.times[trajectory.times <= end.until]
-        return truth.poses(known) if known.max(initial=0.0) > 0 else None
+        return counted_poses(scene, truth, known) if known.max(initial=0.0) > 0 else None
 
 
 def in_scene_order(scene: Scene, trajectory: Trajectory) -> Trajectory:
@@ -150,17 +151,16 @@ def _against_exact(series: Callable[..., np.ndarray]) -> Callable[..., float | N
 
 
 def _violation(level: int) -> Callable[..., float | None]:
+    """Return the largest violation at a level; NaN if turns of a coupling cannot be counted."""
+
     def largest(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
-        return _largest(violation_series(scene, trajectory, level))
+        series = violation_series(scene, trajectory, level)
+        if series is None or not np.isnan(series).any():
+            return _largest(series)
+        used = [getattr(trajectory, key) for key in PER_BODY[: 2 * level + 2]]
+        return math.nan if all(np.isfinite(a).all() for a in used) else math.inf
 
     return largest
-
-
-def _closure(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
-    """Return the largest violation of positions; NaN if turns of a coupling cannot be counted."""
-    series = violation_series(scene, trajectory)
-    is_finite = all(np.isfinite(a).all() for a in (trajectory.position, trajectory.orientation))
-    return math.nan if is_finite and np.isnan(series).any() else _largest(series)
 
 
 def _energy(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
@@ -212,6 +212,8 @@ def reaction_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | Non
         return None
     chosen = np.unique(np.linspace(0, len(exact.times) - 1, SAMPLES).round().astype(int))
     true = _exact_reactions(scene, at_samples(exact, chosen))
+    if any(np.isnan(wrench).any() for wrench in (true.reactions or {}).values()):
+        return None  # full turns on which the forces depend cannot be counted
     found = compare(scene, true, at_samples(trajectory, chosen))
     worst = max([found.resultant, *(joint.unique for joint in found.joints.values())])
     return worst if math.isfinite(worst) else math.inf
@@ -237,8 +239,12 @@ def _known(trajectory: Trajectory, exact: Trajectory) -> Trajectory:
 def at_samples(trajectory: Trajectory, chosen: np.ndarray) -> Trajectory:
     """Return the trajectory at some of its samples (n,)."""
     arrays: dict[str, Any] = {k: None if (a := getattr(trajectory, k)) is None else a[chosen] for k in STATES}
-    reactions = trajectory.reactions and {name: w[chosen] for name, w in trajectory.reactions.items()}
-    return replace(trajectory, **arrays, reactions=reactions)
+    tables: dict[str, Any] = {
+        key: values and {name: rows[chosen] for name, rows in values.items()}
+        for key in ("reactions", "angles")
+        for values in [getattr(trajectory, key)]
+    }
+    return replace(trajectory, **arrays, **tables)
 
 
 _error = _against_exact(error_series)
@@ -249,7 +255,7 @@ METRICS: dict[str, Metric] = {
     "rotation_error": Metric(_against_exact(rotation_error_series), "rad", "rotation error"),
     "scd": Metric(_correct_digits, "digits", "significant correct digits"),
     "velocity_error": Metric(_velocity_error, "", "relative velocity error"),
-    "violation_position": Metric(_closure, "rad", "violation of position constraints", True),
+    "violation_position": Metric(_violation(0), "rad", "violation of position constraints", True),
     "violation_velocity": Metric(_violation(1), "rad/s", "violation of velocity constraints", True),
     "violation_acceleration": Metric(_violation(2), "rad/s²", "violation of acceleration constraints", True),
     "energy_error": Metric(_energy, "", "drift of the energy balance / largest energy"),

@@ -176,8 +176,10 @@ def _regular(scene: Scene, run: Trajectory, chosen: Sequence[int]) -> list[int]:
         return list(chosen)
     units = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))
     scenes = unwound(scene, run)
-    rows = (jacobian(scenes[k], run.times[k], run.position[k], run.orientation[k])[0] * units for k in chosen)
-    values = [np.linalg.svd(matrix, compute_uv=False) for matrix in rows]
+    poses = {k: (scenes[k], run.times[k], run.position[k], run.orientation[k]) for k in chosen}
+    rows = {k: jacobian(*pose)[0] * units for k, pose in poses.items()}
+    chosen = [k for k, matrix in rows.items() if np.isfinite(matrix).all()]
+    values = [np.linalg.svd(rows[k], compute_uv=False) for k in chosen]
     ranks = [int(np.sum(v > RANK * v[0])) for v in values]
     near = [bool(v[rank - 1] < NEXT_TO_SINGULAR * v[0]) for v, rank in zip(values, ranks, strict=True)]
     return [k for k, r, n in zip(chosen, ranks, near, strict=True) if r == max(ranks) and not n]

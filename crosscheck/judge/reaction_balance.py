@@ -32,7 +32,8 @@ ABSURD = 10.0  # multiple of the largest exact force above which a reaction is i
 
 def with_exact_reactions(scene: Scene, exact: Trajectory) -> Trajectory:
     """Return the exact motion with the reactions that cause it (least squares of the joints' rows). Their
-    unique components are exact, and undetermined components have the least norm for unit rows.
+    unique components are exact, and undetermined components have the least norm for unit rows. They are NaN
+    where full turns on which a coupling depends cannot be counted.
 
     Raises ValueError if the motion has no accelerations.
     """
@@ -41,6 +42,10 @@ def with_exact_reactions(scene: Scene, exact: Trajectory) -> Trajectory:
     for k, own in enumerate(unwound(scene, exact)):
         position, orientation = exact.position[k], exact.orientation[k]
         rows, _ = jacobian(own, exact.times[k], position, orientation)
+        if np.isnan(rows).any():
+            for wrenches in found.values():
+                wrenches[k] = np.nan
+            continue
         scaled, units, sizes = unit_rows(scene, rows)
         turned, strengths = _of_armatures(scene, exact, k)
         pushed = units * (wanted[k].ravel() - turned.T @ strengths)

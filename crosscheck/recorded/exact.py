@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from crosscheck.judge.full_turns import DENSE, FINEST, with_dense
 from crosscheck.judge.reference.reference import SECONDS, NoReference, reference
 from crosscheck.judge.start import started
 from crosscheck.judge.truth import NoSolution, closed_form
@@ -17,11 +18,6 @@ from crosscheck.recorded.columns import SI, kind_of, start_columns, values
 from mbref.files import replaced
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-
-DENSE = 400  # least number of further times at which the exact motion is computed
-UNEVEN = 0.3  # largest fraction of a step by which a further time is moved: it shows amplitudes over 0.4 rad
-GOLDEN = (np.sqrt(5.0) - 1) / 2  # its multiples are spread evenly over fractions of one
-FINEST = 16  # multiple of DENSE at which the search for full turns between samples ends
 
 
 @dataclass(frozen=True)
@@ -85,20 +81,6 @@ def uncounted(columns: Mapping[str, np.ndarray]) -> tuple[str, ...]:
     if not any(kind_of(name) == "angle" for name in unknown):
         return ()
     return tuple(n for n, column in unknown.items() if kind_of(n) == "angle" or np.isfinite(column[0]))
-
-
-def with_dense(times: np.ndarray, dense: int) -> np.ndarray:
-    """Return times (k,) and further times from 0 to their end. A further time has at least a tenth of a step
-    to a given time.
-
-    Steps are uneven, so that no oscillation has one rate at all times and looks like a steady turning.
-    """
-    part = np.arange(dense + 1.0)
-    part[1:-1] += UNEVEN * (2 * (GOLDEN * part[1:-1] % 1.0) - 1)
-    more = times[-1] * part / dense
-    after = np.minimum(np.searchsorted(times, more), len(times) - 1)
-    nearest = np.minimum(np.abs(times[after] - more), np.abs(times[np.maximum(after - 1, 0)] - more))
-    return np.union1d(times, more[nearest > 0.1 * times[-1] / dense])
 
 
 def reference_table(
