@@ -26,7 +26,7 @@ NOISE = 1e-6
 SHARE, LOST = 0.1, 0.1
 NEAR_LIMIT = 0.1  # of the allowed value: smaller measured values of a check are not compared
 SAME_VERDICT = tuple(f"{status}:" for status in (PASS, FAIL))  # beginnings of changes of a measured value
-RESULTS = ("run", "outcome", "accelerations", "motion", "error", "check")
+RESULTS = ("run", "outcome", "accelerations", "solvers", "motion", "error", "check")
 
 
 class Found(NamedTuple):
@@ -69,7 +69,18 @@ def _of_documents(before: Any, after: Any, scenes: Mapping[str, Scene]) -> Itera
         return
     old, new = ([d] if isinstance(d, Mapping) else d for d in (before, after))
     for a, b in zip(old, new, strict=True):
+        yield from _of_solvers(a, b)
         yield from _of_runs(scenes[b["scene"]], a, b)
+
+
+def _of_solvers(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[Found]:
+    """Yield the pairs of solvers that agree on a scene in one version and differ in the other."""
+    before, after = ({tuple(one["ways"]): one for one in d.get("disagreements", ())} for d in (old, new))
+    for ways in dict.fromkeys([*after, *before]):
+        if (ways in before) != (ways in after):
+            change = "agree → differ" if ways in after else "differ → agree"
+            sentence = (after.get(ways) or before[ways])["sentence"]
+            yield Found("solvers", new["scene"], f"{change}: {sentence}")
 
 
 def _of_runs(scene: Scene, old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[Found]:

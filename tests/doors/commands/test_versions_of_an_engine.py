@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from crosscheck.alternatives.at_model import disagreements
 from crosscheck.cli.commands import main
 from crosscheck.engine import Setting
 from crosscheck.versions.bisection import bisected
@@ -19,6 +20,8 @@ from crosscheck.versions.library import defaults_of, used_names
 from crosscheck.versions.measured import Measured
 from tests.helpers.falling_engine import STONE, Falling
 from tests.helpers.wheels import ENGINE, PACKAGE, write_wheel
+
+SEVERAL = "tests.helpers.falling_engine:SEVERAL"  # its solvers fall with g or 1.5 g
 
 
 def versions(folder: Path, *words: str) -> tuple[int, Any, str]:
@@ -30,14 +33,17 @@ def versions(folder: Path, *words: str) -> tuple[int, Any, str]:
     return done.returncode, json.loads(done.stdout or "null"), done.stderr
 
 
-def measured(version: str, factor: float = 1.0, seconds: float = 1.0, card: str = "pass") -> Measured:
-    """Return what a version does on the stone, and one verdict of the suite."""
+def measured(
+    version: str, factor: float = 1.0, seconds: float = 1.0, card: str = "pass", engine: str | None = None
+) -> Measured:
+    """Return what a version does on the stone, and one verdict of the suite; its solvers are an engine's."""
     setting = Setting("plain", {"step": 1e-3})
     run = Falling().run(STONE, np.linspace(0.0, 0.2, 3), Setting("plain", {"factor": factor})).to_record()
     run |= {"asked": {"options": setting.options}, "metrics": {}, "cost": {"seconds": seconds}}
     verdict = {"scene": "pendulum", "card": "energy/1", "status": card, "measured": 0.1, "reason": ""}
     suite = {"verdicts": [verdict | {"allowed": 1.0}]}
-    documents = [{"scene": "stone", "records": [run]}, suite]
+    pairs = [one._asdict() for one in disagreements(STONE, [engine] if engine else [])]
+    documents = [{"scene": "stone", "records": [run], "disagreements": pairs}, suite]
     return Measured(Requirement(PACKAGE, version), {}, documents, {})
 
 
@@ -57,6 +63,15 @@ def test_changes_beyond_noise_are_named_by_kind(changed: dict[str, Any], kinds: 
     large changes accelerations by (1.5 - 1) / 1.5 = 0.33 of the largest, and their error from 0 to 0.5."""
     found = between(measured("1.0"), measured("1.1", **changed), [STONE])
     assert [(one.kind, one.change) for one in found] == kinds
+
+
+def test_solvers_that_agree_in_one_version_alone_are_named_with_the_right_one():
+    """In one of two versions a solver takes 1.5 g, by which it is off by a third of its acceleration."""
+    agree, differ = measured("1.0"), measured("1.1", engine=SEVERAL)
+    (appeared,), (gone,) = between(agree, differ, [STONE]), between(differ, agree, [STONE])
+    assert appeared.kind == gone.kind == "solvers" and appeared.is_result
+    assert appeared.change.startswith("agree → differ: ") and "supports 'light'" in appeared.change
+    assert gone.change.startswith("differ → agree: ") and between(differ, differ, [STONE]) == []
 
 
 def test_commands_without_a_result_are_named_for_each_version_and_for_both():
