@@ -130,7 +130,7 @@ def run(group: str, scene: Scene, chosen: list[tuple[str, float]]) -> Iterator[C
     truth = truth_for(scene, SECONDS)
     for method, rtol in chosen:
         motion = simulate(scene, method, times, Limits(rtol=rtol))
-        exact = exact_motion(motion, truth) if motion.times.size else None
+        exact = exact_motion(scene, motion, truth) if motion.times.size else None
         if exact is None or truth is None or len(exact.times) < 2:
             continue
         estimate = with_error_estimate(motion).error_estimate

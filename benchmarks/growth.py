@@ -94,7 +94,7 @@ def of_mbref(scene: Scene, method: str, rtol: float) -> Attempt:
     def attempt() -> tuple[float, np.ndarray]:
         run = simulate(scene, method, [scene.duration], Limits(rtol=rtol))
         if run.outcome.name != "COMPLETED":
-            raise RuntimeError(f"{run.outcome.label} at {run.end_time:.3g} s")
+            raise RuntimeError(f"{run.outcome.label} at {run.t_end:.3g} s")
         return run.cost.seconds, run.position[-1]
 
     return attempt

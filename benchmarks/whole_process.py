@@ -91,7 +91,7 @@ def parts(scene: str, candidate: Candidate) -> Parts:
         said = subprocess.run(command, cwd=here, capture_output=True, text=True, check=True).stdout
         stepping, built, whole = json.loads(said.splitlines()[-1])
         found.append((stepping, built, whole - stepping - built))
-    return tuple(map(median, zip(*found[1:], strict=True)))  # type: ignore[return-value]
+    return tuple(map(median, zip(*found[1:], strict=True)))
 
 
 def even(ours: Parts, our_cost: float, theirs: Parts, their_cost: float, first: int) -> str:
