@@ -56,7 +56,7 @@ class Cost:
     Attributes
     ----------
     seconds : float
-        Process CPU time of the stepping alone, s.
+        Process CPU time of the stepping alone, s; in a scene with events also of locating them.
     build_seconds : float
         CPU time of everything before the first step, s.
     steps, rejected : int

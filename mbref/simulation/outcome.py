@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -139,6 +141,27 @@ def facts_of(run: Run) -> dict[str, Any]:
 def cost_of(seconds: float, built: float, counts: Sequence[int]) -> Cost:
     """Return the cost of a run from ``layout.Counts`` in their order, without crossings."""
     return Cost(seconds, built, *map(int, counts[:5]))
+
+
+class Spent:
+    """CPU time of the runs of which a motion with events is made: of building them, and of all the rest, in
+    which events are located."""
+
+    def __init__(self) -> None:
+        self._began, self._built = time.process_time(), 0.0
+
+    def in_run(self, motion: Motion) -> Motion:
+        """Return a motion, whose building counts."""
+        self._built += motion.cost.build_seconds
+        return motion
+
+    def of(self, pieces: Sequence[Motion]) -> Cost:
+        """Return the cost up to now, with the counts of the pieces."""
+        counts = {
+            field.name: sum(getattr(each.cost, field.name) for each in pieces) for field in fields(Cost)
+        }
+        rest = time.process_time() - self._began - self._built
+        return Cost(**counts | {"seconds": max(rest, counts["seconds"]), "build_seconds": self._built})
 
 
 def _singular_position(run: Run, status: int) -> Met | None:

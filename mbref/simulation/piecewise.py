@@ -26,12 +26,13 @@ from mbref.motions.pieces import (
     in_contact,
     next_piece,
 )
-from mbref.motions.trajectory import PER_BODY, Cost, Outcome, Trajectory
+from mbref.motions.trajectory import PER_BODY, Outcome, Trajectory
 from mbref.scene import Joint, Scene, SceneError
 from mbref.scene.bodies import DRIVER
 from mbref.scene.intervals import at_sample, samples_at
 from mbref.simulation.conditions import Conditions
 from mbref.simulation.end_stops import EndStops, laws, with_impact
+from mbref.simulation.outcome import Spent
 from mbref.simulation.zeros import SAME_ZERO, first_zero
 from mbref.stepping.limits import Limits
 from mbref.stepping.run import missing_masses
@@ -64,11 +65,12 @@ def simulate_pieces(
     if not scene.has_mass():
         raise SceneError(missing_masses(scene))
     times = samples_at(times, event_times(scene, np.inf))
-    watch = _Watch(scene, lambda scene, times: run(scene, times, None), times)
+    spent = Spent()
+    watch = _Watch(scene, lambda scene, times: spent.in_run(run(scene, times, None)), times)
     begin, ends, stops = 0.0, event_times(scene, float(times[-1])), watch.stops
     piece, pieces, events, turned = first_piece(scene), [], [], dict[str, float]()
     contacts: tuple[str, ...] = ()
-    if stops.sides and stops.starts(start := run(piece, np.zeros(1), None)):
+    if stops.sides and stops.starts(start := spent.in_run(run(piece, np.zeros(1), None))):
         after, event = _event(scene, piece, (), _end(start, 0.0, turned), turned, stops)
         if event.stops or event.contacts:
             piece, contacts, events = after, event.contacts, [event]
@@ -77,9 +79,8 @@ def simulate_pieces(
         end, names = watch.next_event(piece, contacts, turned, begin, end)
         own = times[(times >= begin) & (times < end)] if end is not None else times[times >= begin]
         local = own - begin if end is None else np.append(own - begin, end - begin)
-        motion = run(
-            in_contact(piece, contacts), local if local.size else np.zeros(1), _later(progress, begin)
-        )
+        held, local = in_contact(piece, contacts), local if local.size else np.zeros(1)
+        motion = spent.in_run(run(held, local, _later(progress, begin)))
         pieces.append(_Piece(begin, motion, min(own.size, len(motion.times))))
         if end is None or motion.outcome is not Outcome.COMPLETED:
             break
@@ -91,7 +92,7 @@ def simulate_pieces(
         if watch.is_needed and len(events) >= MOST_EVENTS:
             pieces[-1] = replace(pieces[-1], motion=_too_many(motion, events))
             break
-    return _joined(scene, times, pieces, events)
+    return replace(_joined(scene, times, pieces, events), cost=spent.of([each.motion for each in pieces]))
 
 
 class _Watch:
@@ -239,7 +240,6 @@ def _joined(scene: Scene, times: np.ndarray, pieces: Sequence[_Piece], events: S
         outcome=last.motion.outcome,
         t_end=float(times[-1]) if is_complete else last.begin + last.motion.t_end,
         message=_message(pieces),
-        cost=Cost(*(sum(getattr(m.cost, f.name) for m in motions) for f in fields(Cost))),
     )
 
 
