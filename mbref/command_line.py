@@ -3,12 +3,15 @@ output files, and exit statuses."""
 
 from __future__ import annotations
 
+import _thread
 import argparse
 import os
 import re
+import signal
 import sys
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -22,6 +25,7 @@ CHOICE = re.compile(r"invalid choice: '?(.*?)'? \(choose from (.*)\)")
 NUMBER_FAULT = re.compile(r"invalid (float|int) value: ")
 BAD_INPUT, INTERRUPTED = 2, 130  # exit statuses
 MOST_DURATION = 1e9  # s; a longer motion would end by the limit of time or steps in every engine
+SOON = 0.01  # s after which a lost interrupt is repeated
 MOST_PLACE = 1_000_000  # largest number of a singular position, an equilibrium or a vibration in a list
 KINDS = {"float": "must be a number, got ", "int": "must be a whole number, got "}
 
@@ -83,7 +87,7 @@ def status_of(action: Callable[[], int], *refused: type[Exception]) -> int:
     texts are escaped.
     """
     reported: tuple[type[Exception], ...] = (InputError, SceneError, *refused)
-    with printable_streams():
+    with printable_streams(), _lost_interrupts_repeated():
         try:
             try:
                 return action()
@@ -101,6 +105,28 @@ def status_of(action: Callable[[], int], *refused: type[Exception]) -> int:
             if error.filename == OUTPUT:
                 discard_output()
             return _refuse([f"{error.filename}: {error.strerror}"])
+
+
+@contextmanager
+def _lost_interrupts_repeated() -> Iterator[None]:
+    """Repeat an interrupt that is lost because it comes while Python removes an object; elsewhere Python
+    prints a traceback and goes on."""
+    before, repeated = sys.unraisablehook, list[threading.Timer]()
+
+    def hear(lost: sys.UnraisableHookArgs) -> None:
+        if not issubclass(lost.exc_type, KeyboardInterrupt):
+            before(lost)
+        elif signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            repeated.append(threading.Timer(SOON, _thread.interrupt_main))
+            repeated[-1].start()
+
+    sys.unraisablehook = hear
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
+        for timer in repeated:
+            timer.cancel()
 
 
 def _refuse(faults: Sequence[str], status: int = BAD_INPUT) -> int:

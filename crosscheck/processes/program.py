@@ -23,11 +23,20 @@ from mbref.command_line import INTERRUPTED
 def run_program(module: str, options: Sequence[str]) -> int:
     """Run a module as a program and return its exit status, negative if a signal ended it.
 
-    The program has a process group of its own, so that it gets each interrupt once, from here.
+    The program has a process group of its own, so that it gets each interrupt once, from here. It hears an
+    interrupt when Python has started.
     """
     command = [sys.executable, "-m", __name__, module, *options]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, process_group=0) as started, _passed_on(started):
-        return started.wait()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # which the program inherits
+    try:
+        with (
+            subprocess.Popen(command, stdin=subprocess.PIPE, process_group=0) as started,
+            _passed_on(started),
+        ):
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            return started.wait()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextlib.contextmanager
@@ -53,6 +62,7 @@ def main() -> None:
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     sys.argv[:] = sys.argv[1:]
     try:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
     except KeyboardInterrupt:  # while it was imported
         sys.exit(INTERRUPTED)

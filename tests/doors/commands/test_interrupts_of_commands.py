@@ -1,9 +1,13 @@
 """Ctrl-C ends a command with one word and the exit status 130, also while its modules are imported."""
 
+import signal
 import subprocess
 import sys
+import time
 
 import pytest
+
+from mbref.command_line import status_of
 
 PRESSED = """
 import signal, sys
@@ -26,3 +30,23 @@ def test_interrupt_of_an_import_ends_a_command_with_one_word(program) -> None:
     words = [sys.executable, "-c", PRESSED, program]
     ran = subprocess.run(words, capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stdout, ran.stderr) == (130, "", "interrupted\n")
+
+
+def test_interrupt_that_python_loses_while_it_removes_an_object_ends_the_command_too(capsys):
+    """Python prints a traceback for an exception in ``__del__``, and goes on: the command would wait 30 s."""
+
+    class Removed:
+        def __del__(self) -> None:
+            signal.raise_signal(signal.SIGINT)
+
+    def action() -> int:
+        Removed()
+        time.sleep(30.0)
+        return 0
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        assert status_of(action) == 130
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert capsys.readouterr().err == "interrupted\n"
