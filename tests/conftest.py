@@ -1,7 +1,9 @@
 """Hypothesis profiles: ``check`` is reproducible, ``deep`` searches, ``first`` ends at a failure. Processes
-that run all tests share the compilation of kernels. Each computes with one thread: more would wait for each
-other. ``slow.toml`` lists cases with the mark slow."""
+that run all tests begin with those that need no kernels, and share the compilation of those that are not
+compiled by then. Each computes with one thread: more would wait for each other. ``slow.toml`` lists cases
+with the mark slow."""
 
+import functools
 import gc
 import os
 import sys
@@ -26,6 +28,9 @@ HERE = Path(__file__).parent
 SLOW = tomllib.loads((HERE / "slow.toml").read_text())  # file: test: patterns of the slow cases
 OWN_FOLDERS = {".pytest_cache", ".hypothesis", "__pycache__", ".coverage"}  # of the tests' own tools
 MANY = 2000  # tests, among which every kernel is needed
+# of two processes, folders whose tests need no kernels; without files that run mbref
+FIRST = (("meta", "reports", "zoo"), ("doors/judge",))
+RUNS_MBREF = ("test_impacts", "test_published.", "test_rounded", "test_small", "test_tables_of")
 
 
 def pytest_collection(session: pytest.Session) -> None:
@@ -86,15 +91,37 @@ def names_missing_engine(pattern: str) -> bool:
     return any(name in pattern and not installed(name) for name in BUILT_IN + OPTIONAL + ON_REQUEST)
 
 
+def group(item: pytest.Item) -> int:
+    """Return the index of the group of FIRST with an item's folder; 2 if there is none, or if the file runs
+    mbref."""
+    folder, runs = item.path.parent.relative_to(HERE).as_posix(), item.path.name.startswith(RUNS_MBREF)
+    return next((k for k, folders in enumerate(FIRST) if folder in folders and not runs), 2)
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Compile the kernels, or load them; what has been imported is not searched for garbage again."""
+    """Let each of two processes begin with a group of FIRST: one begins with the first test, the other one
+    with the test in the middle. What has been imported is not searched for garbage again."""
     gc.freeze()
-    worker = os.environ.get("PYTEST_XDIST_WORKER")
-    if len(session.items) < MANY or worker is None:
-        return
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        items = session.items
+        first, second, others = ([item for item in items if group(item) == k] for k in range(3))
+        middle = max(0, len(items) // 2 - len(first))
+        items[:] = [*first, *others[:middle], *second, *others[middle:]]
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Compile the kernels, or load them, before the first test outside of FIRST."""
+    if "PYTEST_XDIST_WORKER" in os.environ and len(item.session.items) >= MANY and group(item) == len(FIRST):
+        prepare_kernels()
+
+
+@functools.cache
+def prepare_kernels() -> None:
+    """Compile or load the kernels that the tests need; two processes begin at both ends."""
     from tests.kernels import prepare
 
-    prepare(backwards=worker != "gw0")
+    prepare(backwards=os.environ["PYTEST_XDIST_WORKER"] != "gw0")
 
 
 @pytest.fixture(autouse=True)
