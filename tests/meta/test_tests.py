@@ -64,7 +64,7 @@ def imported_from_product(path: Path) -> dict[str, str]:
 
 def private_uses(path: Path) -> Iterator[str]:
     """Yield private names of the product that a test file imports or reads from an object."""
-    if not re.search(r"(?<!\w)_[a-z]", path.read_text()):
+    if private_names().isdisjoint(re.findall(r"(?<!\w)_\w+", path.read_text())):
         return  # parsing takes long
     nodes = list(ast.walk(parsed(path)))
     own = {node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.ClassDef)}

@@ -30,9 +30,9 @@ MOTIONS: dict[tuple[str, int, float], tuple[Trajectory, dict[str, Any]]] = {}
 
 
 def motion(scene: Scene, times: np.ndarray) -> tuple[Trajectory, dict[str, Any]]:
-    """The exact motion at no more than 21 of the times, with its metrics; of SPATIAL, whose truth takes long,
-    at a tenth of them."""
-    few = times[:: max(1, len(times) // 20)] * (0.1 if scene.name == SPATIAL else 1.0)
+    """The exact motion at no more than 21 of the times, divided by four, with its metrics; of SPATIAL, whose
+    truth takes long, divided by ten."""
+    few = times[:: max(1, len(times) // 20)] / (10 if scene.name == SPATIAL else 4)
     key = (scene.name, len(few), float(few[-1]))
     if key not in MOTIONS:
         truth = truth_for(scene)
