@@ -3,17 +3,14 @@
 import json
 import math
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
 import crosscheck
-from crosscheck.cli import main
 from crosscheck.conformance.mechanisms.specimens import specimens
 from crosscheck.judge.openings import opening
 from crosscheck.processes.pool import end_idle
 from mbref.motions.trajectory import Outcome, Trajectory
-from mbref.scene import Scene
 from tests.helpers.geared_arms import arms
 
 FAILING = "tests.helpers.still_engines:FAILING"
@@ -26,15 +23,15 @@ def _own_children() -> Iterator[None]:
     end_idle()
 
 
-@pytest.mark.parametrize("scene", [each.scene for each in specimens()], ids=lambda scene: scene.name)
-def test_run_without_samples_has_no_metric_and_an_infinite_opening(scene: Scene):
+def test_run_without_samples_has_no_metric_and_an_infinite_opening():
     """On each mechanism of the conformance suite; gap (m) and angle (rad) are infinite."""
-    run = Trajectory.failed(
-        scene=scene.name, engine="by hand", version="", method="", settings={},
-        bodies=tuple(body.name for body in scene.body), outcome=Outcome.TIMED_OUT, message="no result",
-    )  # fmt: skip
-    assert set(crosscheck.measure(scene, run).values()) == {None}
-    assert opening(scene, run) == (math.inf, math.inf, ())
+    for scene in (each.scene for each in specimens()):
+        run = Trajectory.failed(
+            scene=scene.name, engine="by hand", version="", method="", settings={},
+            bodies=tuple(body.name for body in scene.body), outcome=Outcome.TIMED_OUT, message="no result",
+        )  # fmt: skip
+        assert set(crosscheck.measure(scene, run).values()) == {None}, scene.name
+        assert opening(scene, run) == (math.inf, math.inf, ()), scene.name
 
 
 def test_comparison_reports_an_engine_that_crashes_before_its_first_sample():
@@ -44,19 +41,3 @@ def test_comparison_reports_an_engine_that_crashes_before_its_first_sample():
     assert [row["outcome"] for row in found.rows] == ["CRASHED"] and found.rows[0]["error"] is None
     assert "still completes no run" in found.verdict.right and "crashed" in str(found)
     assert json.loads(json.dumps(found.document(), allow_nan=False))["records"][0]["times"] == []
-
-
-def printed(capsys: pytest.CaptureFixture[str], folder: Path, name: str, *options: str) -> str:
-    """Return the output of a command, with exit status 1, for the engine that raises an error in each run."""
-    path = str(folder / "arms.toml")
-    arms(1.0, coupled=True).with_(duration=0.1).save(path)
-    words = {"run": [path, "--engine", FAILING], "tune": [FAILING, path]}[name]
-    assert main([name, *words, *options, "--reference-time", "0"]) == 1
-    return capsys.readouterr().out
-
-
-@pytest.mark.parametrize(("command", "outcomes"), [("run", [("CRASHED", [])]), ("tune", [])])
-def test_json_of_run_has_the_crash_of_an_engine_and_of_tune_no_setting(command, outcomes, tmp_path, capsys):
-    """The engine raises an error before the first sample of each run, so that tuning finds no setting."""
-    records = json.loads(printed(capsys, tmp_path, command, "--json"))["records"]
-    assert [(record["outcome"], record["times"]) for record in records] == outcomes

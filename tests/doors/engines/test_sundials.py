@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting, engine
-from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory
-from mbref.scene import Body, Revolute, Scene, TorsionSpring
+from mbref.scene import Scene
 from mbref.scenes import SCENES
 from tests.helpers.measured import MARGIN, completed_error, error_of_samples
 
@@ -42,24 +41,6 @@ def test_tolerance_of_a_hundredth_reduces_ida_s_error_fivefold() -> None:
     scene = SCENES["spatial_slider_crank"]()
     errors = [completed_error(simulate(scene, 0.01, rtol), scene) for rtol in (1e-4, 1e-6, 1e-8)]
     assert errors[1] < errors[0] / 5 and errors[2] < errors[1] / 5
-
-
-def test_ida_swings_a_torsion_spring_past_two_turns_as_the_closed_form() -> None:
-    """A wheel released at 0 swings about the spring's natural angle, 8 rad, past 14 rad. The truth is the
-    damped oscillator; the deviation is at most ten times the measured 2.9e-7 rad."""
-    inertia, stiffness, damping, natural = 0.5, 2.0, 0.05, 8.0
-    wheel = Body(name="wheel", mass=1.0, inertia=(0.3, 0.3, inertia), position=(0.0, 0.0, 0.0))
-    axle = Revolute(name="J", bodies=("ground", "wheel"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
-    spring = TorsionSpring(joint="J", stiffness=stiffness, damping=damping, natural_angle=natural)
-    run = simulate(Scene(name="wheel", body=(wheel,), joint=(axle,), load=(spring,)), 2.0, 1e-8, 41)
-    decay, rate = damping / (2 * inertia), math.sqrt(stiffness / inertia)
-    damped = math.sqrt(rate**2 - decay**2)
-    t, swing = run.times, np.exp(-decay * run.times)
-    angle = natural * (1 - swing * (np.cos(damped * t) + decay / damped * np.sin(damped * t)))
-    turned = rotations.from_vector(angle[:, None] * np.array([0.0, 0.0, 1.0]))
-    gap = rotations.angle_between(run.orientation[:, 0], turned).max()
-    assert run.outcome is Outcome.COMPLETED and angle.max() > 14, run.message
-    assert gap < MARGIN * 2.9e-7, f"{gap:.1e} rad off"
 
 
 def test_ida_stops_at_the_singular_position_of_a_driven_four_bar() -> None:
