@@ -10,7 +10,7 @@ from tests.fuzz.command_lines import drawn_command
 LENGTHY = {"compare", "verify"}  # commands that run for minutes
 
 
-@pytest.mark.parametrize(("target", "count"), [("scene_file", 150), ("scene_data", 300)])
+@pytest.mark.parametrize(("target", "count"), [("scene_file", 80), ("scene_data", 150)])
 def test_mutated_scene_is_accepted_or_refused_with_a_scene_error(target, count, tmp_path, monkeypatch):
     """Each seed changes a right scene. A defect is another error than SceneError; both endings occur."""
     monkeypatch.chdir(tmp_path)

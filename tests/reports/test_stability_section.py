@@ -32,10 +32,11 @@ def test_stability_table_counts_right_ended_and_wrong_runs(snapshot):
         record("gap", 1e-1, 5e-3, engine="mujoco", family="projected"),
         record("gap", 3e-3, 0.5, engine="mujoco", family="projected"),
     ]
-    (table,) = [b for b in section.render(records) if isinstance(b, Table)]
+    blocks = section.render(records)
+    (table,) = [b for b in blocks if isinstance(b, Table)]
     counted = ("mbref", "taylor", "1", "1", "2"), ("mujoco", "projected", "1", "0", "1")
     assert [tuple(row) for row in table.rows] == [*counted]
-    assert [b.text for b in section.render(records) if isinstance(b, Text)][:2] == snapshot
+    assert [b.text for b in blocks if isinstance(b, Text)][:2] == snapshot
 
 
 def test_sentence_says_if_no_other_method_completes_a_wrong_motion():

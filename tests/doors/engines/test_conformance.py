@@ -109,7 +109,7 @@ def test_an_engine_that_refuses_every_scene_is_not_shown_to_conform(capsys):
     """The exit status is 1 with one scene of the suite, and with one random mechanism."""
     assert main(["verify", f"{FAKES}:REFUSING", "--scene", "free_fall", "--in-process"]) == 1
     assert "an engine that runs no scene is not shown to conform" in " ".join(capsys.readouterr().out.split())
-    assert main(["verify", f"{FAKES}:REFUSING", "--mechanisms", "1"]) == 1
+    assert main(["verify", f"{FAKES}:REFUSING", "--mechanisms", "1", "--in-process"]) == 1
 
 
 def test_verify_refuses_an_unknown_scene_with_status_two(capsys):

@@ -32,9 +32,15 @@ QUICK = (  # one for each kind of joint, load, driver and coupling
 )  # fmt: skip
 
 
+@functools.cache
+def scene_of(name: str) -> Scene:
+    """Return the scene of a short motion, made once."""
+    return MOTIONS[name]()
+
+
 def each(condition: Callable[[Scene], bool] = lambda _: True) -> pytest.MarkDecorator:
     """Return the parametrisation by short motions without singular position that meet a condition."""
-    names = [name for name in MOTIONS if name not in CROSSED and condition(MOTIONS[name]())]
+    names = [name for name in MOTIONS if name not in CROSSED and condition(scene_of(name))]
     cases = [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in names]
     return pytest.mark.parametrize("name", cases)
 

@@ -62,7 +62,7 @@ def referred(scene: Scene, times: np.ndarray) -> Reference:
     return found
 
 
-@pytest.mark.parametrize("name", a_few(list(MOTIONS), 5))
+@pytest.mark.parametrize("name", a_few(list(MOTIONS), 9))
 def test_judge_computes_the_stored_states_again_within_their_bound(name):
     """The stored bound, at least 20 roundings, is of poses; rates have ten times as much."""
     scene, exact = MOTIONS[name](), stored()[name]
