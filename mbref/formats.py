@@ -71,7 +71,7 @@ def add_options(parser: Any) -> None:
         default="",
         help="kinds of parts that may be left out although they change the motion, separated by commas:\n"
         "armature, couplings, damping, flexible-bodies, fluid, friction, gravity-compensation, limits,\n"
-        "motors, springs, or everything; what a scene can describe stays",
+        "motors, sleep, springs, or everything; what a scene can describe stays",
     )
     parser.add_argument(
         "--keyframe",

@@ -24,10 +24,12 @@ LIMITED = """<mujoco><compiler angle="radian"/><worldbody>
         ("range='0 1'", "", "", "joint 's'"),
         ("range='-1 0'", "", "up", "joint 's'"),
         ("range='0.1 1'", "", "up", "joint 's'"),
+        ("range='-0.1 1' margin='0.2'", "", "up", "joint 's'"),
     ],
     ids=[
         *("gravity lengthens the rope", "speed lengthens the rope", "rope too long, speed shortens it"),
         *("gravity lowers the slide", "speed raises the slide", "slide too low, speed raises it"),
+        "slide within the margin, in which MuJoCo's limit pushes",
     ],
 )
 def test_a_limit_that_acts_at_the_start_is_refused_or_left_out_on_request(files, joint, tendon, key, name):
@@ -47,6 +49,27 @@ def test_a_switch_of_a_file_turns_off_springs_or_dampers_of_tendons(files, flag,
     text = text.replace("<worldbody>", f"<option><flag {flag}='disable'/></option><worldbody>")
     [load] = files.scene(text, "a.xml")[0].load
     assert (load.stiffness, load.damping) == left
+
+
+def test_a_tendon_spring_between_sites_of_one_body_is_left_out_with_a_note(files):
+    """Its forces on the body cancel."""
+    text = LIMITED.format(joint="", tendon="stiffness='2'").replace(
+        "<site site='hook'/>", "<site site='nose'/>"
+    )
+    text = text.replace('site="hook"', 'site="nose"').replace(
+        "</body>", "<site name='nose' pos='1 0 0'/></body>"
+    )
+    scene, out = files.scene(text, "a.xml")
+    assert not scene.load and "tendon 'rope': both sites are on 'bob'" in out
+
+
+def test_a_body_that_begins_asleep_is_refused_unless_its_sleep_is_left_out(files):
+    """MuJoCo does not move it. The speed of the keyframe "up" wakes it."""
+    text = LIMITED.format(joint="", tendon="").replace('name="bob"', 'name="bob" sleep="init"')
+    text = text.replace("<worldbody>", "<option><flag sleep='enable'/></option><worldbody>")
+    assert "sleep of bob: it changes the motion; --without sleep" in files.refusal(text, "a.xml")
+    assert "(--without sleep)" in files.scene(text, "a.xml", "--without", "sleep")[1]
+    assert "(--without sleep)" not in files.scene(text, "a.xml", "--keyframe", "up")[1]
 
 
 FOLDING = """<mujoco><worldbody><body name="crank"><joint name="A" axis="0 1 0"/>

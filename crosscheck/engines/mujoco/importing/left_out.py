@@ -22,6 +22,7 @@ KINDS = {  # kinds of parts that change the motion → their description
     "gravity-compensation": "bodies whose weight is compensated",
     "limits": "limits of joints and tendons that act at the start",
     "motors": "actuators that exert a force and that no load of a scene describes",
+    "sleep": "bodies that begin asleep, which MuJoCo does not move",
     "springs": "springs of joints and tendons that no load of a scene describes",
 }
 EVERYTHING = "everything"
@@ -72,6 +73,19 @@ def of_model(model: Any, kept: Collection[int]) -> Iterator[Part]:
     if found := [model.body(int(b)).name for b in np.flatnonzero(model.body_gravcomp)]:
         yield Part("gravity-compensation", f"compensation of the weight of {_listed(found)}")
     yield from flexible(model)
+
+
+def asleep(mujoco: Any, model: Any, key: int) -> Iterator[Part]:
+    """Return a part for the bodies that are asleep at the keyframe ``key``, or without one for -1, and let no
+    body of the model sleep."""
+    data, awake = mujoco.MjData(model), -1  # sleeping trees have numbers from 0
+    if key >= 0:
+        mujoco.mj_resetDataKeyframe(model, data, key)
+    mujoco.mj_forward(model, data)
+    roots = model.tree_bodyadr[np.flatnonzero(data.tree_asleep > awake)]
+    model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+    if len(roots):
+        yield Part("sleep", f"sleep of {_listed([model.body(int(b)).name or f'body {b}' for b in roots])}")
 
 
 def flexible(model: Any) -> list[Part]:

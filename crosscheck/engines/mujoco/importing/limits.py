@@ -16,15 +16,16 @@ PUSHES = 1e-9  # fraction of the largest velocity or acceleration; smaller ones 
 
 
 def acting(mujoco: Any, model: Any, data: Any, actuators: Actuators) -> Iterator[Part]:
-    """Return a part for each limit that is exceeded at the pose of the data, or against which the mechanism
-    moves or accelerates; the model's own switch may turn all limits off."""
+    """Return a part for each limit that acts at the pose of the data, within its margin or beyond its end, or
+    against which the mechanism moves or accelerates; the model's own switch may turn all limits off."""
     bits = mujoco.mjtDisableBit
     if model.opt.disableflags & (bits.mjDSBL_CONSTRAINT | bits.mjDSBL_LIMIT):
         return
     near = copy.copy(model)
     near.opt.disableflags |= bits.mjDSBL_CONTACT | bits.mjDSBL_FRICTIONLOSS
     near.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-    near.jnt_margin[:] = near.tendon_margin[:] = AT_LIMIT
+    for margin in (near.jnt_margin, near.tendon_margin):
+        margin[:] = np.maximum(margin, AT_LIMIT)
     at = _forward(mujoco, near, data, actuators)
     kinds = mujoco.mjtConstraint
     rows = [
@@ -43,7 +44,8 @@ def acting(mujoco: Any, model: Any, data: Any, actuators: Actuators) -> Iterator
         motion = [jacobian[row] @ rates for rates in (data.qvel, free.qacc)]  # < 0: towards the limit
         least = [PUSHES * float(np.abs(jacobian[row]) @ np.abs(rates)) for rates in (data.qvel, free.qacc)]
         speed, push = (0.0 if abs(m) <= size else m for m, size in zip(motion, least, strict=True))
-        if at.efc_pos[row] < -AT_LIMIT or speed < 0 or (speed == 0 and push < 0):
+        gap = at.efc_pos[row] - at.efc_margin[row] + AT_LIMIT
+        if gap < -AT_LIMIT or speed < 0 or (speed == 0 and push < 0):
             is_joint = at.efc_type[row] == kinds.mjCNSTR_LIMIT_JOINT
             seen.add((is_joint, int(at.efc_id[row])))
     for is_joint, k in sorted(seen, reverse=True):

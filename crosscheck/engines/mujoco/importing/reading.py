@@ -126,6 +126,9 @@ class _Reader:
         """Read everything, at a pose with closed loops."""
         mujoco, model = self.mujoco, self.model
         key = keyframes.number_of(mujoco, model, self.options.keyframe)
+        if model.opt.enableflags & getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0):
+            self.parts += left_out.asleep(mujoco, model, key)
+            self.unread = ("the sleep of bodies that come to rest",)
         self.actuators = Actuators(mujoco, model, key)
         self.parts += self.actuators.parts
         closures = self._closures()
@@ -302,4 +305,5 @@ class _Reader:
             *loads.of_tendons(mujoco, model, data, self.groups),
         ]
         self.parts += [part for part in found if isinstance(part, Part)]
-        self.loads += [load for load in found if not isinstance(load, Part)]
+        self.notes += [note for note in found if isinstance(note, str)]
+        self.loads += [load for load in found if not isinstance(load, Part | str)]
