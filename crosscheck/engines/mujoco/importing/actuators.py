@@ -185,6 +185,8 @@ class Actuators:
         control = float(controls[0])
         if model.actuator_dyntype[a] == kinds.mjDYN_NONE:
             return control
+        if not len(activations):
+            return None
         steady = {int(kinds.mjDYN_INTEGRATOR): 0.0}
         steady |= dict.fromkeys(
             (int(kinds.mjDYN_FILTER), int(kinds.mjDYN_FILTEREXACT)), float(activations[0])

@@ -125,8 +125,9 @@ def _polynomials(model: Any) -> Iterator[Part]:
         numbers[...] = 0
 
 
-def of_tendons(mujoco: Any, model: Any, data: Any, groups: Groups) -> Iterator[Load | Part]:
-    """Return a spring for every tendon between two sites that has stiffness or damping."""
+def of_tendons(mujoco: Any, model: Any, data: Any, groups: Groups) -> Iterator[Load | Part | str]:
+    """Return a spring for every tendon between two sites that has stiffness or damping; a note for one that
+    has both sites on one body."""
     flags, disabled = mujoco.mjtDisableBit, model.opt.disableflags
     for numbers, flag in (
         (model.tendon_stiffness, flags.mjDSBL_SPRING),
@@ -154,6 +155,9 @@ def of_tendons(mujoco: Any, model: Any, data: Any, groups: Groups) -> Iterator[L
             continue
         sites = [int(model.wrap_objid[w]) for w in wraps]
         bodies: Any = tuple(groups.name_of(int(model.site_bodyid[s])) for s in sites)
+        if bodies[0] == bodies[1]:
+            yield f"tendon {name!r}: both sites are on {bodies[0]!r}, which its spring does not move"
+            continue
         yield entry(
             f"tendon {name!r}",
             Spring,
