@@ -55,6 +55,8 @@ def unused(root: ET.Element) -> Iterator[str]:
     """Return sentences on parts that a scene cannot contain and that do not change a motion without
     contacts."""
     yield from xml_files.unread(root, KNOWN)
+    if root.find("world/physics/gravity") is not None:
+        yield "<gravity> of a physics: is not read; since SDF 1.6 it is an element of the world"
     counts = [(len(list(root.iter(tag))), *names) for tag, names in UNUSED.items()]
     limits = sum(limit.find("lower") is not None for limit in root.iter("limit"))
     for count in (*counts, (limits, "limit of a joint", "limits of joints")):

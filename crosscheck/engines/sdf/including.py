@@ -19,18 +19,21 @@ SCHEMES = ("model://", "file://", "package://")
 CONFIGURATION, MODEL_FILE = "model.config", "model.sdf"
 AXES_IN_MODEL = (1, 4)  # last version whose axes are given in the frame of the model
 EXPRESSED_IN = (1, 7)  # first version whose axes name their frame, in place of use_parent_model_frame
+GRAVITY_OF_WORLD = (1, 6)  # first version whose gravity is in the world, not in its physics
 OVERRIDES = ("pose", "static")
 STILL = ("sun", "ground_plane", "asphalt_plane")  # models of Gazebo's library in which nothing moves
 
 
 def expanded(root: ET.Element, file: Path) -> ET.Element:
-    """Return a copy with the included models in place of all includes; raises SceneError, OSError.
+    """Return a copy with the included models in place of all includes, and gravity where version 1.6 has it;
+    raises SceneError, OSError.
 
     Includes of STILL are removed. Another model is looked for beside the file, in the two folders above it,
     and in the folders of VARIABLES.
     """
     found = copy.deepcopy(root)
     state_frame_of_axes(found)
+    _move_gravity(found)
     _expand(found, (file.resolve(),))
     return found
 
@@ -47,6 +50,18 @@ def state_frame_of_axes(root: ET.Element) -> None:
             axis.set(IN_MODEL, "true")
         if given is not None:
             axis.remove(given)
+
+
+def _move_gravity(root: ET.Element) -> None:
+    """Move the gravity of the physics into the world in files before version 1.6."""
+    world = root.find("world")
+    if world is None or _version(root) >= GRAVITY_OF_WORLD:
+        return
+    for physics in world.findall("physics"):
+        if (gravity := physics.find("gravity")) is not None:
+            physics.remove(gravity)
+            if world.find("gravity") is None:
+                world.append(gravity)
 
 
 def _version(root: ET.Element, where: str = "") -> tuple[int, ...]:
@@ -76,6 +91,8 @@ def _included(include: ET.Element, files: tuple[Path, ...], depth: int) -> ET.El
         raise SceneError([f"include {uri!r}: merge='true' is not read; give the model a name of its own"])
     if include.find("placement_frame") is not None:
         raise SceneError([f"include {uri!r}: placement_frame is not read; give the pose of the model"])
+    if any(part.tag.endswith("params") for part in include):
+        raise SceneError([f"include {uri!r}: experimental:params is not read; change the model's own file"])
     path = _file_of(uri, files[-1].parent)
     if path in files:
         raise SceneError([f"include {uri!r}: {path} includes itself"])
@@ -90,6 +107,7 @@ def _included(include: ET.Element, files: tuple[Path, ...], depth: int) -> ET.El
             for own in model.findall(tag):
                 model.remove(own)
             model.append(given)
+    model.extend(part for part in include if part.tag not in ("uri", "name", *OVERRIDES))
     _expand(model, (*files, path), depth + 1)
     return model
 

@@ -5,7 +5,9 @@ from typing import Any
 
 import pytest
 
+from crosscheck.engines.loaders.loader import SDF
 from crosscheck.engines.sdf import reading
+from crosscheck.files.meaning import meant
 from mbref.formats import Imported, ImportOptions
 from mbref.scene import SceneError
 
@@ -36,6 +38,19 @@ def test_links_without_inertial_and_worlds_without_gravity_get_sdf_s_defaults(tm
     mass = "link 'b' has no inertial: 1 kg and 1 kg m², the defaults of SDF"
     assert found.notes == (mass, "gravity is 9.8 m/s² downwards, the default of SDF")
     assert found.scene.gravity == (0.0, 0.0, -9.8) and not read(tmp_path, LINK).notes
+
+
+@pytest.mark.parametrize(("version", "gravity"), [("1.4", -1.6), ("1.5", -1.6), ("1.6", -9.8)])
+def test_gravity_of_the_physics_counts_before_sdf_1_6_in_the_import_and_in_every_reader(
+    version: str, gravity: float, tmp_path: Path
+) -> None:
+    """Version 1.6 moved the element to the world, whose default is 9.8 m/s² downwards."""
+    text = f"<physics><gravity>0 0 -1.6</gravity></physics><model name='m'>{LINK}</model>"
+    path = tmp_path / "moon.sdf"
+    path.write_text(f"<sdf version='{version}'><world name='w'>{text}</world></sdf>")
+    found = reading.read(path, ImportOptions())
+    assert found.scene.gravity == meant(path, SDF).gravity == (0.0, 0.0, gravity)
+    assert any("of a physics: is not read" in said for said in found.left_out) == (gravity == -9.8)
 
 
 @pytest.mark.parametrize(
