@@ -12,7 +12,7 @@ import numpy as np
 from crosscheck.engines.loaders.constrained import held
 from crosscheck.engines.loaders.loader import MJCF, Loaded, Loader
 from crosscheck.engines.loaders.machine import Rows, Statics, Vector, matrix, vector
-from crosscheck.engines.loaders.mujoco import Compiled, without_others
+from crosscheck.engines.loaders.mujoco import Compiled
 from crosscheck.engines.loaders.posed import Pose
 
 FIELDS = (  # of the compiled model, read from MJX's model
@@ -61,7 +61,6 @@ class Put(Compiled):
         bias, centres and rows of equalities."""
         if gravity not in self.forward_at:
             own, bits = copy.copy(self.model), self.mujoco.mjtDisableBit
-            without_others(own)
             own.opt.gravity[:] = gravity
             own.opt.disableflags = int(bits.mjDSBL_CONSTRAINT | bits.mjDSBL_ACTUATION)
             kept = self.mjx.put_model(own)

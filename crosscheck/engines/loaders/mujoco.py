@@ -31,6 +31,7 @@ from crosscheck.engines.loaders.machine import (
     vector,
 )
 from crosscheck.engines.loaders.posed import Pose
+from crosscheck.engines.mujoco.importing.actuators import moved_to_joints
 from crosscheck.engines.mujoco.importing.couplings import of_equalities
 from crosscheck.engines.mujoco.importing.posing import JointRow
 from crosscheck.engines.mujoco.warnings_off import without_warnings
@@ -66,6 +67,9 @@ class Compiled(Loaded):
 
     def __init__(self, mujoco: Any, model: Any):
         self.mujoco, self.model = mujoco, model
+        list(moved_to_joints(mujoco, model))  # in place; parts of tendons are not compared
+        without_others(model)
+        obey(mujoco, model)
         self.data, self.flags = mujoco.MjData(model), int(model.opt.disableflags)
         self.place()
 
@@ -112,7 +116,8 @@ class Compiled(Loaded):
     def _joint(self, j: int, pair: tuple[str, str]) -> Joint:
         m, kind, dof = self.model, int(self.model.jnt_type[j]), int(self.model.jnt_dofadr[j])
         name, anchor = self.joint(j), vector(self.data.xanchor[j])
-        acting = m.jnt_limited[j] and not m.opt.disableflags & self.mujoco.mjtDisableBit.mjDSBL_LIMIT
+        bits = self.mujoco.mjtDisableBit
+        acting = m.jnt_limited[j] and not m.opt.disableflags & (bits.mjDSBL_LIMIT | bits.mjDSBL_CONSTRAINT)
         common: dict[str, Any] = {
             "damping": coefficients(m.dof_damping[dof], *m.dof_dampingpoly[dof]),
             "stiffness": coefficients(m.jnt_stiffness[j], *m.jnt_stiffnesspoly[j]),
@@ -246,7 +251,6 @@ class Compiled(Loaded):
         return {name: float(data.qpos[q] - m.qpos0[q]) for name, q in start.items()}
 
     def _put(self, pose: Pose, rates: Pose) -> None:
-        without_others(self.model)
         self.mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:], self.data.qvel[:] = self.coordinates(pose), 0.0
         for name, dof in self.dofs().items():
@@ -259,8 +263,25 @@ class Compiled(Loaded):
         return whole
 
 
+def obey(mujoco: Any, model: Any) -> None:
+    """Set the springs, dampers and dry friction of joints to zero that the file's flags disable."""
+    off, bits = model.opt.disableflags, mujoco.mjtDisableBit
+    for flag, numbers in (
+        (bits.mjDSBL_SPRING, (model.jnt_stiffness, model.jnt_stiffnesspoly)),
+        (bits.mjDSBL_DAMPER, (model.dof_damping, model.dof_dampingpoly)),
+        (bits.mjDSBL_FRICTIONLOSS | bits.mjDSBL_CONSTRAINT, (model.dof_frictionloss,)),
+    ):
+        for each in numbers if off & flag else ():
+            each[...] = 0.0
+
+
 def without_others(model: Any) -> None:
-    """Set forces to zero that are not compared: of fluids, tendons and compensated weights."""
+    """Set forces and inertias to zero that are not compared: of fluids, tendons and compensated weights."""
     model.opt.density = model.opt.viscosity = 0.0
-    for strength in (model.tendon_stiffness, model.tendon_damping, model.body_gravcomp):
+    for strength in (
+        model.tendon_stiffness,
+        model.tendon_damping,
+        model.tendon_armature,
+        model.body_gravcomp,
+    ):
         strength[:] = 0.0

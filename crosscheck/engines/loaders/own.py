@@ -31,7 +31,7 @@ from crosscheck.engines.loaders.machine import (
 )
 from crosscheck.engines.loaders.placing import ORIGIN, Place, vector_of
 from crosscheck.engines.loaders.posed import Pose, Posed, in_single_axes
-from crosscheck.engines.mujoco.importing.actuators import Actuators
+from crosscheck.engines.mujoco.importing.reading import source
 from crosscheck.judge.small_motions.posed import posed as restarted
 from mbref import formats, rotations
 from mbref.motions.trajectory import Outcome, Trajectory
@@ -43,7 +43,8 @@ MOVED = "the joints moved to close it"  # words of a note: the scene is not at t
 
 
 class Own(Loader):
-    """The importers of ``mbref import``; parts that no scene describes are left out, each with a sentence."""
+    """The importers of ``mbref import``; parts that no scene describes are left out, each with a sentence, as
+    are the forces of actuators and tendons of MJCF, which are not compared."""
 
     name = "mbref"
     package = "mbref"
@@ -55,16 +56,19 @@ class Own(Loader):
         ending = {MJCF: ".xml", URDF: ".urdf", SDF: ".sdf"}[form]
         if path.suffix != ending:
             raise ValueError(f"the importers read this format from files that end in {ending}")
-        found = formats.read(path, formats.ImportOptions(without=EVERYTHING))
-        motors = _servos(path) if form == MJCF else {}
-        return Imported(found.scene, (*found.left_out, *found.notes), motors)
+        options = formats.ImportOptions(without=EVERYTHING)
+        if form == MJCF:
+            found = source(path, options, is_passive=True).imported
+        else:
+            found = formats.read(path, options)
+        return Imported(found.scene, (*found.left_out, *found.notes))
 
 
 class Imported(Loaded):
-    """A scene at its start; ``motors`` are stiffness and damping that actuators give joints."""
+    """A scene at its start."""
 
-    def __init__(self, scene: Scene, messages: tuple[str, ...], motors: Mapping[str, tuple[float, float]]):
-        self.scene, self.messages, self.motors = scene, messages, motors
+    def __init__(self, scene: Scene, messages: tuple[str, ...]):
+        self.scene, self.messages = scene, messages
 
     def machine(self) -> Machine:
         tree, loops = self._tree()
@@ -149,9 +153,7 @@ class Imported(Loaded):
         springs = [
             load
             for load in self.scene.load
-            if isinstance(load, TorsionSpring | SlideSpring)
-            and load.joint == joint.name
-            and not np.allclose((load.stiffness, load.damping), self.motors.get(joint.name, math.inf))
+            if isinstance(load, TorsionSpring | SlideSpring) and load.joint == joint.name
         ]
         stiffness = coefficients(sum(spring.stiffness for spring in springs))
         found: dict[str, Any] = {
@@ -257,19 +259,6 @@ def _displacement(joint: Joint, moved: Mapping[str, Place]) -> float:
     relative = first.inverse().then(second)
     moving = vector_of(relative.turn) if joint.type == REVOLUTE else relative.position
     return float(moving @ np.array(joint.axis))
-
-
-def _servos(path: Path) -> dict[str, tuple[float, float]]:
-    """Return the stiffness and damping of the actuators of each joint, which a scene has as springs."""
-    import mujoco
-
-    model = mujoco.MjModel.from_xml_path(str(path))
-    found: dict[str, tuple[float, float]] = {}
-    for law in Actuators(mujoco, model, -1).laws:
-        name = str(model.joint(law.joint).name)
-        stiffness, damping = found.get(name, (0.0, 0.0))
-        found[name] = stiffness + law.stiffness, damping + law.damping
-    return found
 
 
 def _rest(spring: TorsionSpring | SlideSpring) -> float:

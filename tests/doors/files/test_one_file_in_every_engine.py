@@ -22,7 +22,7 @@ from crosscheck.files import public
 from crosscheck.files.constraints import rows_of
 from crosscheck.files.corpus import CASES
 from crosscheck.files.corpus.case import value_at
-from crosscheck.files.corpus.mjcf import HINGE, body, model
+from crosscheck.files.corpus.mjcf import HINGE, arm, body, hinge, model
 from crosscheck.files.corpus.mjcf_equalities import pair
 from crosscheck.files.differences import of_reading
 from crosscheck.files.dynamics_differences import of_rows, of_values
@@ -221,6 +221,42 @@ def test_mbref_and_mujoco_end_runs_where_the_meaning_of_the_file_does(what: str,
         ends = [since(file.asked.starts[0][0], end) for end in found.ends]
         match = matched(file.machine, found.machine, DOUBLE)
         assert of_values(match, ends, file.moved, "displacement", tolerance) == []
+
+
+GIVEN = hinge('stiffness="5" damping="0.3" frictionloss="0.2"')
+SERVO = '<actuator><position joint="elbow" kp="4" gear="2" armature="0.1" damping="0.2"/></actuator>'
+ROPE = '<tendon><fixed stiffness="9" armature="1"><joint joint="elbow" coef="2"/></fixed></tendon>'
+
+
+@pytest.mark.parametrize(
+    ("more", "off", "shoulder", "elbow"),
+    [
+        ("", "spring", ((), (0.3,), 0.2), ((), 0.0)),
+        ("", "damper", ((5.0,), (), 0.2), ((), 0.0)),
+        ("", "constraint", ((5.0,), (0.3,), 0.0), ((), 0.0)),
+        (
+            SERVO,
+            "frictionloss",
+            ((5.0,), (0.3,), 0.0),
+            ((0.8,), 0.4),
+        ),  # 0.2 N m s/rad and 0.1 kg m², times 2²
+        (ROPE, "actuation", ((5.0,), (0.3,), 0.2), ((), 0.0)),
+    ],
+)
+def test_flags_of_an_mjcf_file_count_and_its_servos_and_tendons_do_not(more, off, shoulder, elbow, tmp_path):
+    """A flag disables springs, dampers or dry friction. A servo's control and a tendon are not compared; an
+    actuator's damping and armature act on its joint without control. Our import and MuJoCo agree with the
+    file, but for dry friction, which no scene has."""
+    file = file_of(written(tmp_path, arm(GIVEN, more, f'<option><flag {off}="disable"/></option>')))
+    first, second = file.machine.joints[-2:]
+    assert (first.stiffness, first.damping, first.friction) == shoulder
+    assert (second.damping, second.armature) == elbow
+    for reader in (Own(), Mujoco()):
+        found = built(reader, file.path, MJCF, file.asked)
+        rest = differences(matched(file.machine, found.machine, DOUBLE), file, found, DOUBLE)
+        assert {d.field for d in rest} <= {"friction"} and bool(rest) == (
+            shoulder[2] > 0 and reader.name == "mbref"
+        )
 
 
 @pytest.mark.parametrize(

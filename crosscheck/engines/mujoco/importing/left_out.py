@@ -163,6 +163,14 @@ def _holding_sites(mujoco: Any, model: Any) -> set[int]:
     return {*model.eq_obj1id[ends], *model.eq_obj2id[ends], *model.wrap_objid[wrapped]}
 
 
+def actuators_and_tendons(mujoco: Any, model: Any) -> None:
+    """Let actuators and tendons exert no force in the model; armatures and dampers of actuators stay."""
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    parts = ("stiffness", "damping", "stiffnesspoly", "dampingpoly", "frictionloss", "armature")
+    for part in parts:
+        getattr(model, f"tendon_{part}")[...] = 0
+
+
 def stripped(model: Any, kept: Collection[int]) -> None:
     """Remove the parts of ``of_model`` from the model's matrices, in place."""
     armature = model.dof_armature.copy()

@@ -60,8 +60,10 @@ class Source:
     qvel: np.ndarray
 
 
-def source(path: Path, options: ImportOptions) -> Source:
+def source(path: Path, options: ImportOptions, is_passive: bool = False) -> Source:
     """Return the scene and the model of a .xml (MJCF) or .urdf file; raises SceneError, ValueError, OSError.
+
+    A passive scene has no forces of actuators and of tendons.
 
     SceneError names a part that changes the motion and that a scene cannot describe, a loop that cannot be
     closed, or a part in which the scene and the compiled model disagree.
@@ -69,13 +71,15 @@ def source(path: Path, options: ImportOptions) -> Source:
     import mujoco
 
     with without_warnings(mujoco):
-        return _read(mujoco, path, options)
+        return _read(mujoco, path, options, is_passive)
 
 
-def _read(mujoco: Any, path: Path, options: ImportOptions) -> Source:
+def _read(mujoco: Any, path: Path, options: ImportOptions, is_passive: bool) -> Source:
     without = left_out.checked(options.without)
     model, text, notes = compiled(mujoco, path, options)
     values.check(mujoco, model)
+    if is_passive:
+        left_out.actuators_and_tendons(mujoco, model)
     if model.nbody < 2:  # the first body is the world
         raise SceneError([f"{path}: has no body"])
     reader = _Reader(mujoco, model, text, options, without, notes=notes)
