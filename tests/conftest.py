@@ -1,5 +1,5 @@
 """Hypothesis profiles: ``check`` is reproducible, ``deep`` searches, ``first`` ends at a failure. Processes
-that run all tests begin with those that need no kernels, and share the compilation of those that are not
+that run all tests begin with those that need hardly a kernel, and share the compilation of those that are not
 compiled by then. Each computes with one thread: more would wait for each other. ``slow.toml`` lists cases
 with the mark slow."""
 
@@ -28,7 +28,7 @@ HERE = Path(__file__).parent
 SLOW = tomllib.loads((HERE / "slow.toml").read_text())  # file: test: patterns of the slow cases
 OWN_FOLDERS = {".pytest_cache", ".hypothesis", "__pycache__", ".coverage"}  # of the tests' own tools
 MANY = 2000  # tests, among which every kernel is needed
-# of two processes, folders whose tests need no kernels; without files that run mbref
+# of two processes, folders whose tests need hardly a kernel; without files that run mbref
 FIRST = (("meta", "reports", "zoo"), ("doors/judge",))
 RUNS_MBREF = ("test_impacts", "test_published.", "test_rounded", "test_small", "test_tables_of")
 
