@@ -26,8 +26,9 @@ def directional_derivative(function: Callable[[np.ndarray], np.ndarray], h: np.n
 
 
 def affine() -> Stencil:
-    """Return the stencil with offsets -1 to 1, exact for functions whose two estimates agree."""
-    return Stencil(np.array([-1.0, 0.0, 1.0]), np.array([-0.5, 0.0, 0.5]), np.array([0.0, -1.0, 1.0]))
+    """Return the stencil with offsets -1, 1/2 and 1, exact for functions whose two estimates agree. Those
+    of a cubic function differ at its inflection, too."""
+    return Stencil(np.array([-1.0, 0.5, 1.0]), np.array([-0.5, 0.0, 0.5]), np.array([-2.0, 2.0, 0.0]) / 3.0)
 
 
 def central() -> Stencil:

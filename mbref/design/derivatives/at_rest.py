@@ -145,6 +145,6 @@ def _solved(request: DerivativeRequest, step: float) -> Derivatives:
     for k, number in enumerate(request.numbers):
         along = Direction(found.x[None, :, k], still, still, found.multipliers[None, :, k])
         by_state = columns.along(model, found.state, along)
-        pairs.append(np.add(by_state, columns.by_number(number, found.state)))
+        pairs.append(np.add(by_state, columns.by_number(number, found.state, model)))
     values, rounding = np.stack(pairs, axis=-1)
     return Derivatives(np.inf, columns.names, values, rounding)

@@ -292,7 +292,7 @@ class _Blocks:
         found = self.columns.along(self.model, many, Direction(*(part.T for part in parts)))
         split = [np.split(each.T, [f, 2 * f, 2 * f + p], axis=1) for each in found]
         for k, number in enumerate(self.numbers):
-            own = self.columns.by_number(number, self.at)
+            own = self.columns.by_number(number, self.at, self.model)
             for whole, each in zip(split, own, strict=True):
                 whole[2][:, k] += each[0]
         of_values, of_rounding = (StateBlocks(s[0], s[1], s[3], s[2]) for s in split)

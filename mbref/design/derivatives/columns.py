@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from mbref.design.derivatives.numbers_of_scene import SceneNumber
+from mbref.design.derivatives.numbers_of_scene import SceneNumber, variants_of
 from mbref.design.derivatives.states import Direction, States, terms_along
 from mbref.design.differences import directional_derivative
 from mbref.equations.joint_angles import angles_at
@@ -21,6 +22,9 @@ from mbref.scene import Scene
 from mbref.scene.bodies import DRIVER
 
 EPSILON = float(np.finfo(float).eps)
+# error of a difference / its terms: up to RESOLVED_COLUMN no further step is tried, and above UNRESOLVED a
+# smaller step is tried though the last one gave no better derivative, as of fast functions of time
+RESOLVED_COLUMN, UNRESOLVED = 100.0 * EPSILON, 1e-6
 # quantities that count, are largest values, or vanish on the exact motion
 WITHOUT_DERIVATIVE = (
     *("time", "open", "active", "impulse", "angular_impulse", "largest_reaction", "error_estimate"),
@@ -113,12 +117,31 @@ class Columns:
         change, apart = directional_derivative(at, steps), steps[:, None]
         return change / apart, EPSILON * self._largest(largest) / apart
 
-    def by_number(self, number: SceneNumber, states: States) -> tuple[np.ndarray, np.ndarray]:
-        """Return the derivative (k, columns) by a number at equal states, and its rounding."""
-        largest = np.zeros(len(self.names))
-        derivative = number.derivative(lambda scene, model: self._noted(largest, scene, model, states))
-        rounding = EPSILON * self._largest(largest) * np.abs(number.weights).max()
-        return derivative, rounding * np.ones_like(derivative)
+    def by_number(self, number: SceneNumber, states: States, base: Model) -> tuple[np.ndarray, np.ndarray]:
+        """Return the derivative (k, columns) by a number at equal states, and its error; ``base`` is the
+        model of the scene.
+
+        A column such as the torque sin(ω t) of a load is not affine in a number in which the scene's arrays
+        are. Then stencils of order 8 with smaller and smaller steps follow; each column has the best one.
+        """
+        shape = states.times.size, len(self.names)
+        largest, found, errors = np.zeros(shape[1]), np.zeros(shape), np.full(shape, np.inf)
+
+        def at(scene: Scene, model: Model) -> np.ndarray:
+            return self._noted(largest, scene, model, states)
+
+        further = variants_of(self.motion.mechanism, number.label, base)
+        for variants in itertools.chain([number.variants], further):
+            values, error = variants.derivative(at)
+            most = self._largest(largest) * np.abs(variants.stencil.weights).max() / variants.step
+            error += EPSILON * most
+            worst, before = (each.max(axis=0, initial=0.0) for each in (error, errors))
+            is_better = worst < before
+            found[:, is_better], errors[:, is_better] = values[:, is_better], error[:, is_better]
+            may_improve = is_better & (worst > RESOLVED_COLUMN * most) | (worst > UNRESOLVED * most)
+            if not may_improve.any():
+                break
+        return found, errors
 
     def _noted(self, largest: np.ndarray, scene: Scene, model: Model, states: States) -> np.ndarray:
         """Return the columns at states, and update the largest values (columns,) in place."""

@@ -15,7 +15,7 @@ from mbref.design.derivatives.at_rest import (
     state_at_rest,
 )
 from mbref.design.derivatives.numbers_of_scene import Variants, variants_of
-from mbref.design.derivatives.sensitivities import DIFFERENCE_ROUNDING, NUMBER_STEP, SECOND_PRECISION
+from mbref.design.derivatives.sensitivities import DIFFERENCE_ROUNDING, SECOND_PRECISION
 from mbref.design.derivatives.tangents import TangentRows, tangents_at, with_accelerations
 from mbref.equations.model import Model, displaced
 from mbref.input_error import InputError
@@ -99,7 +99,7 @@ def eigenvalue_sensitivities(scene: Scene | str | Path, to: Sequence[str]) -> Ei
     found = np.full((len(values), len(request.labels)), np.nan, dtype=complex)
     errors = np.full(found.shape, np.nan)
     for k, label in enumerate(request.labels):
-        variants = variants_of(request.scene, label, request.model, NUMBER_STEP)
+        variants = next(variants_of(request.scene, label, request.model))
         change, uncertain = _slope(variants, moved, k, rate)
         for group in groups:
             found[group, k], errors[group, k] = _slopes(whole, values[group], change, uncertain)

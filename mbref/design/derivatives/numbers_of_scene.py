@@ -1,7 +1,7 @@
 """Numbers of a scene with respect to which a motion is differentiated.
 
 The arrays that the equations read, and the start of a scene, are closed forms of its numbers. Their
-derivatives are differences between variants of the scene: two variants where all arrays are affine in the
+derivatives are differences between variants of the scene: three variants where all arrays are affine in the
 number, as in most, and differences of order 8 otherwise. The variants of all numbers are packed together.
 """
 
@@ -40,6 +40,7 @@ CHANGED_ROUNDINGS = 100.0  # roundings of the largest value in an array, below w
 EPSILON = float(np.finfo(float).eps)
 
 
+NUMBER_STEP = 0.02  # first step of differences between variants of a scene / size of the number
 AccurateStencils = dict[str, tuple[float, Stencil]]  # factors and stencils, by path
 
 
@@ -56,6 +57,20 @@ class Variants(NamedTuple):
     def model(self, place: int) -> Model:
         """Return the model of the scene with an index."""
         return Model(self.packs.scenes[self.first + place], self.packs, self.first + place)
+
+    def derivative(self, function: Callable[[Scene, Model], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Return the derivative by the number of a function of a variant's scene and model, and its
+        difference from the one of lower order."""
+        values = []
+        for place, scene in enumerate(self.scenes):
+            model = self.model(place)
+            values.append(function(scene, model))
+            model.release()
+        changes = np.array(values) - values[0]
+        found, lower = (
+            np.tensordot(w, changes, 1) / self.step for w in (self.stencil.weights, self.stencil.lower)
+        )
+        return found, np.abs(found - lower)
 
 
 def _variant_scenes(scene: Scene, label: str, step: float, stencil: Stencil) -> tuple[Scene, ...]:
@@ -89,19 +104,20 @@ def _packed_variants(
     return found
 
 
-def variants_of(scene: Scene, label: str, base: Model, step: float) -> Variants:
-    """Return variants for differences of order 8, with the largest step up to one that leaves all scenes
-    valid; central if possible. ``base`` and ``step`` are as of ``scene_number``."""
-    size = step * size_of_number(number_at(scene, label), label, base)
-    faults: list[SceneError] = []
-    for factor, stencil in (*CENTRAL_STENCILS[1:], *ONE_SIDED_STENCILS):
+def variants_of(scene: Scene, label: str, base: Model) -> Iterator[Variants]:
+    """Yield variants for differences of order 8 that leave all scenes valid, with smaller and smaller steps,
+    the central ones first; raises SceneError if there are none. ``base`` is as of ``scene_numbers``."""
+    size = NUMBER_STEP * size_of_number(number_at(scene, label), label, base)
+    stencils, faults = (*CENTRAL_STENCILS[1:], *ONE_SIDED_STENCILS), list[SceneError]()
+    for factor, stencil in stencils:
         try:
             scenes = _variant_scenes(scene, label, factor * size, stencil)
         except SceneError as fault:
             faults.append(fault)
             continue
-        return _packed_variants([(label, factor * size, stencil, scenes)], base)[0]
-    raise faults[-1]
+        yield _packed_variants([(label, factor * size, stencil, scenes)], base)[0]
+    if len(faults) == len(stencils):
+        raise faults[-1]
 
 
 @dataclass(frozen=True)
@@ -122,41 +138,31 @@ class SceneNumber:
     v: np.ndarray
     error: float
 
-    def derivative(self, function: Callable[[Scene, Model], np.ndarray]) -> np.ndarray:
-        """Return the derivative by the number of a function of a variant's scene and model."""
-        total = 0.0
-        for k in np.flatnonzero(self.weights).tolist():
-            model = self.variants.model(k)
-            total = total + self.weights[k] * function(self.variants.scenes[k], model)
-            model.release()
-        return np.asarray(total)
-
 
 def scene_numbers(
-    scene: Scene, labels: Sequence[str], base: Model, step: float, accurate: AccurateStencils | None = None
+    scene: Scene, labels: Sequence[str], base: Model, accurate: AccurateStencils | None = None
 ) -> list[SceneNumber]:
     """Return the numbers of a scene at paths such as ``body[rod].mass`` or ``joint[B].anchor.x``.
 
-    ``base`` is the model of the assembled scene, ``step`` the increment over a number's size. The stencils
-    of ``accurate`` are tried first, and those that are accurate are kept there. Raises SceneError if a path
-    has no number, or if no value near it makes a valid scene; InputError if the arrays do not depend on a
-    number smoothly.
+    ``base`` is the model of the assembled scene. The stencils of ``accurate`` are tried first, and those that
+    are accurate are kept there. Raises SceneError if a path has no number, or if no value near it makes a
+    valid scene; InputError if the arrays do not depend on a number smoothly.
     """
     if accurate is None:
-        return base.once(_numbers_of_scene, scene, tuple(labels), step)
-    return _searched(scene, labels, base, step, accurate)
+        return base.once(_numbers_of_scene, scene, tuple(labels))
+    return _searched(scene, labels, base, accurate)
 
 
-def _numbers_of_scene(base: Model, scene: Scene, labels: Sequence[str], step: float) -> list[SceneNumber]:
-    return _searched(scene, labels, base, step, {})
+def _numbers_of_scene(base: Model, scene: Scene, labels: Sequence[str]) -> list[SceneNumber]:
+    return _searched(scene, labels, base, {})
 
 
 def _searched(
-    scene: Scene, labels: Sequence[str], base: Model, step: float, accurate: AccurateStencils
+    scene: Scene, labels: Sequence[str], base: Model, accurate: AccurateStencils
 ) -> list[SceneNumber]:
     """Return ``scene_numbers``; each round evaluates the next stencil of all that are not accurate."""
     searches = {label: _StencilSearch(label, accurate) for label in labels}
-    sizes = {label: step * size_of_number(number_at(scene, label), label, base) for label in labels}
+    sizes = {label: NUMBER_STEP * size_of_number(number_at(scene, label), label, base) for label in labels}
     while left := [search for search in searches.values() if not search.is_done]:
         sets = []
         for search in left:

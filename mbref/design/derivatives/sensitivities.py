@@ -42,7 +42,6 @@ from mbref.stepping.limits import FINEST, Limits
 # has a truncation of about 600 h⁸ and a rounding of 2e-16/h
 FIRST_PRECISION, SECOND_PRECISION = Precision(16, 0.02), Precision(20, 0.01)
 RTOL = 1e-12  # default relative tolerance of the runs
-NUMBER_STEP = 0.02  # first step of differences between variants of a scene / size of the number
 FINER = 0.1  # tolerance of the more accurate run / tolerance
 ORDER = 24  # order of the series of the more accurate run
 DIFFERENCE_ROUNDING = 2e-14  # error of a difference of order 8 / largest derivative over the samples
@@ -192,8 +191,7 @@ class DerivativeRequest:
     def numbers(self) -> list[SceneNumber]:
         """The numbers that are fields of the scene."""
         fields = [label for label in self.labels if not is_of_start(label)]
-        rest = self.model, NUMBER_STEP, self.accurate
-        return scene_numbers(self.scene, fields, *rest)
+        return scene_numbers(self.scene, fields, self.model, self.accurate)
 
     @property
     def has_points(self) -> bool:
@@ -236,7 +234,7 @@ class DerivativeRequest:
         values, rounding = (part.reshape(count, sum(sizes), len(self.outputs)) for part in both)
         for k, number in enumerate(map(numbers.get, labels)):
             if number is not None:
-                own, rounded = columns.by_number(number, states)
+                own, rounded = columns.by_number(number, states, model)
                 values[k] += own
                 rounding[k] += rounded
         signs = self._signs(self.outputs, states, sizes)[..., None]

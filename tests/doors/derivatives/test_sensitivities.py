@@ -147,8 +147,8 @@ def test_angle_of_geared_wheels_depends_on_ratio_and_inertia_as_in_closed_form(o
 
 
 def test_acceleration_by_a_short_spring_depends_on_its_ends_as_in_closed_form():
-    """m a = -k (l - l₀) x/l, l² = x² + y², with m = 2 kg, k = 50 N/m, l₀ = 0.05 m. The spring of 0.14 m is
-    short beside the mechanism, whose second cart stands at 1 m."""
+    """m a = -k (l - l₀) x/l, l² = x² + y², with m = 2 kg, k = 50 N/m, l₀ = 0.05 m, and the energy is
+    k (l - l₀)²/2. The spring of 0.14 m is short beside the mechanism, whose second cart stands at 1 m."""
     carts = [body(name, 2.0, [0.1] * 3, (x, 0.0, 0.0)) for name, x in (("near", 0.1), ("far", 1.0))]
     ends = {"bodies": ["ground", "near"], "points": [[0.0, 0.1, 0.0], [0.1, 0.0, 0.0]]}
     load = [{"type": "spring", **ends, "stiffness": 50.0, "natural_length": 0.05}]
@@ -158,8 +158,28 @@ def test_acceleration_by_a_short_spring_depends_on_its_ends_as_in_closed_form():
     def force_over_mass(x, y):
         return -50.0 / 2.0 * (1 - 0.05 / np.sqrt(x**2 + y**2)) * x
 
-    found = mbref.sensitivities(scene, ["near.acceleration.x"], ["load[0].points[0].y"], [0.0])
-    assert_close(found.values[0, 0], np.array([slope(force_over_mass, {"x": 0.1, "y": 0.1}, "y")]))
+    def energy(x, y):
+        return 50.0 / 2.0 * (np.sqrt(x**2 + y**2) - 0.05) ** 2
+
+    of = ["near.acceleration.x", "load(0).energy"]
+    found = mbref.sensitivities(scene, of, ["load[0].points[0].y"], [0.0])
+    for values, function in zip(found.values[0], (force_over_mass, energy), strict=True):
+        assert_close(values, np.array([slope(function, {"x": 0.1, "y": 0.1}, "y")]))
+
+
+def test_torque_of_a_load_depends_on_its_sine_as_in_closed_form():
+    """The torque 2 sin(ω t + φ) of a wheel has the derivatives 2 t cos(ω t + φ) and 2 cos(ω t + φ) by ω = 3
+    and φ = 0, at t = 0, where sin φ has its inflection, and after ten turns of the phase."""
+    factor = {"sine": {"amplitude": 1.0, "frequency": 3.0}}
+    load = [{"type": "joint_torque", "joint": "A", "torque": 2.0, "factor": factor}]
+    scene, times = pendulum().with_(gravity=(0.0, 0.0, 0.0), load=load), np.array([0.0, 21.0])
+    to = [f"load[0].factor.sine.{name}" for name in ("frequency", "phase")]
+    found = mbref.sensitivities(scene, ["load(0).torque"], to, times)
+    by_phase = 2.0 * np.cos(3.0 * times)
+    assert_close(found.values[:, 0], np.array([times * by_phase, by_phase]).T)
+    first = mbref.sensitivities(scene, ["load(0).torque"], to[1:], times[:1])
+    assert_close(first.values[:, 0, 0], by_phase[:1])
+    assert max(found.errors.max(), first.errors.max()) < 42.0 * ACCURATE
 
 
 def test_derivative_of_a_conserved_energy_stays_the_one_at_the_start():
