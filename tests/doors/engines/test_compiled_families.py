@@ -163,10 +163,8 @@ def error_of(scene: Scene, run: Trajectory) -> float:
 @pytest.mark.parametrize(
     ("name", "beta", "measured"),  # closures' rate (1/s), measured error (of the length, or rad)
     [
-        ("planar_slider_crank", 50.0, 6.9e-10),
         ("spatial_slider_crank_gravity", 20.0, 2.2e-10),
         ("spatial_slider_crank_driven", 50.0, 7.5e-12),
-        ("slider_crank_chain", 50.0, 4.1e-11),
         ("bennett", 30.0, 1.3e-9),
         pytest.param("heavy_top", 15.0, 8.2e-10, marks=pytest.mark.slow),
         pytest.param("andrews_squeezer", 330.0, 8.4e-10, marks=pytest.mark.slow),

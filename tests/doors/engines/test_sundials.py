@@ -23,9 +23,7 @@ def simulate(scene: Scene, duration: float, rtol: float, samples: int = 6) -> Tr
     [
         ("planar_slider_crank_gravity", 0.15, 1.5e-6),
         ("spatial_slider_crank", 0.01, 1.2e-7),
-        ("spatial_slider_crank_driven", 0.05, 3.7e-8),
         ("four_bar", 0.012, 1.4e-8),
-        ("five_bar", 0.012, 1.1e-8),
         ("four_bar_gravity", 0.15, 7.9e-8),
     ],
 )
