@@ -9,15 +9,9 @@ from __future__ import annotations
 from numpy import cos, inf, sin
 
 from mbref.kernels.compilation import kernel
-from mbref.scene import Scene, Sine, TimeFunction
+from mbref.scene import Sine, TimeFunction
 
 AT_REST = Sine(amplitude=0.0, frequency=0.0, phase=0.0)
-
-
-def functions_of(scene: Scene) -> list[TimeFunction]:
-    """Return the functions of time of a scene: of drivers, then of loads if bodies have masses."""
-    loads = scene.load if scene.has_mass() else ()
-    return [*scene.driver, *(load.over_time for load in loads if load.over_time)]
 
 
 def numbers_of(function: TimeFunction, terms: int) -> tuple[float, ...]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from mbref import rotations
 from mbref.equations.couplings import coordinate_primitives, couplings_of
-from mbref.equations.functions import functions_of, numbers_of, pieces_of
+from mbref.equations.functions import numbers_of, pieces_of
 from mbref.equations.joints import Primitive, rows_of_joint, vectors_of
 from mbref.equations.largest_distance import characteristic_lengths
 from mbref.equations.load_numbers import (
@@ -47,11 +47,8 @@ from mbref.kernels.scene_layout import (
     SceneData,
     TurningJoints,
 )
-from mbref.scene import (
-    GROUND,
-    Joint,
-    Scene,
-)
+from mbref.scene import GROUND, Joint, Scene
+from mbref.scene.scene import functions_of
 
 OF_MASS = np.array([7, 7, 7, 8, 9, 10])  # indices of a body's parameters on the diagonal of M
 

@@ -13,7 +13,7 @@ from mbref.scene.bodies import OF_POINT, Body, Driver
 from mbref.scene.conditions import Release, When
 from mbref.scene.couplings import Coupling
 from mbref.scene.fields import Acceleration, EntryType, LaterTime, Name, SceneEntry, Three
-from mbref.scene.functions import Factor, Sine
+from mbref.scene.functions import Factor, Sine, TimeFunction
 from mbref.scene.joints import Coordinate, Free, Joint
 from mbref.scene.loads import Load
 from mbref.scene.paths import replaced_at
@@ -200,10 +200,9 @@ class Scene(SceneEntry):
         SceneError
             If a table ends before, beyond which nothing is known.
         """
-        loads = self.load if self.has_mass() else ()
-        functions = [*self.driver, *(load.over_time for load in loads if load.over_time)]
         is_beyond = end > self.duration * (1 + ROUNDED_END)
-        return self.with_(duration=float(end)) if is_beyond and any(f.table for f in functions) else self
+        has_table = any(function.table for function in functions_of(self))
+        return self.with_(duration=float(end)) if is_beyond and has_table else self
 
     def to_dict(self) -> dict[str, Any]:
         """Return the scene as the nested tables of its file; fields with default values are left out.
@@ -249,6 +248,12 @@ class Scene(SceneEntry):
             return Scene(**data)
         except SceneError as error:
             raise SceneError(with_lines(text, error.faults)) from None
+
+
+def functions_of(scene: Scene) -> list[TimeFunction]:
+    """Return the functions of time of a scene: of drivers, then of loads if bodies have masses."""
+    loads = scene.load if scene.has_mass() else ()
+    return [*scene.driver, *(load.over_time for load in loads if load.over_time)]
 
 
 FIELDS_OF_TABLES = {"": tuple(Scene.model_fields)} | {

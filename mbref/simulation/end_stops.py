@@ -25,6 +25,7 @@ from mbref.motions.pieces import constraint_parts, first_piece, in_contact
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Driver, Scene, SceneError
 from mbref.scene.joints import DISPLACEMENT, Coordinate
+from mbref.scene.scene import functions_of
 from mbref.simulation.zeros import PULL, Signal
 
 GAP_CLOSED = 1e-12  # gap (lengths of the mechanism, or rad) of a coordinate at its end
@@ -252,7 +253,7 @@ def _sides(scene: Scene) -> list[Side]:
 def laws(scene: Scene) -> tuple[list[float], float]:
     """Return the times (s) after 0 at which a driver, or a load over time, changes its law, and the largest
     frequency (rad/s) of their sines."""
-    functions = [*scene.driver, *(load.over_time for load in scene.load if load.over_time)]
+    functions = functions_of(scene)
     knots = {piece.begin for each in functions for piece in each.pieces()}
     sines = [each.sine.frequency for each in functions if each.sine]
     return sorted(knots - {0.0}), max(map(abs, sines), default=0.0)

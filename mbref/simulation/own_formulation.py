@@ -26,6 +26,7 @@ from mbref.method import OWN
 from mbref.motions.motion import Motion
 from mbref.motions.trajectory import Cost, Outcome
 from mbref.scene import Scene, SceneError
+from mbref.scene.scene import functions_of
 from mbref.simulation import VERSION
 from mbref.stepping.control import UNWRAPPED, largest_violation
 from mbref.stepping.limits import Limits
@@ -267,9 +268,8 @@ def _stabiliser(run: _OwnRun, stabilisation: Stabiliser) -> Callable[[], None]:
 
 def _switches(scene: Scene) -> Iterator[float]:
     """Yield the times (s) at which a driver or load of the scene is not analytic."""
-    for function in (*scene.driver, *(load.over_time for load in scene.load)):
-        if function is not None:
-            yield from (piece.begin for piece in function.pieces())
+    for function in functions_of(scene):
+        yield from (piece.begin for piece in function.pieces())
 
 
 def _shaped(value: Any, shape: tuple[int, ...], what: str) -> np.ndarray:

@@ -37,6 +37,7 @@ from crosscheck.judge.stops import (
     still,
     width,
 )
+from crosscheck.judge.time_functions import functions_of
 from mbref.scene import Scene
 
 Run = Callable[[Scene, np.ndarray], Motion]  # of a piece, at increasing times (k,), s
@@ -117,7 +118,7 @@ class Bounces:
 
     def _followed(self, piece: Scene, window: float) -> Motion:
         """Return the motion up to a time (s), at samples that resolve its steps and the functions of time."""
-        functions = [*piece.driver, *(load.over_time for load in piece.load if load.over_time)]
+        functions = functions_of(piece)
         knots = {each.begin for function in functions for each in function.pieces()}
         cuts = [0.0, *sorted(knot for knot in knots if 0.0 < knot < window), window]
         parts = [np.linspace(a, b, BETWEEN) for a, b in itertools.pairwise(cuts)]
