@@ -178,12 +178,12 @@ def _state(request: DerivativeRequest, given: GivenState | None) -> tuple[Motion
         angles = np.zeros((1, len(model.structure.places.turning)))
         q, v = frames.principal_coordinates(q), frames.principal(v)
         at = States(times, q[None], v[None], angles, none, np.zeros((1, model.m)))
-        _refuse_off(model, at)
-    _refuse_singular(model, at, scene.name, request.has_points)
+        _refuse_broken_constraints(model, at)
+    _refuse_state_without_derivatives(model, at, scene.name, request.has_points)
     return motion, at
 
 
-def _refuse_off(model: Model, at: States) -> None:
+def _refuse_broken_constraints(model: Model, at: States) -> None:
     """Raise InputError for a state (1,) that violates the constraints."""
     terms = model.terms(at.times, at.q, at.v, at.angles)[0]
     gap = float(gaps(terms, model.length).max(initial=0.0))
@@ -195,7 +195,7 @@ def _refuse_off(model: Model, at: States) -> None:
         raise InputError(f"state: its velocities are off the constraints by {np.abs(off).max():.2g}")
 
 
-def _refuse_singular(model: Model, at: States, name: str, by_points: bool) -> None:
+def _refuse_state_without_derivatives(model: Model, at: States, name: str, by_points: bool) -> None:
     """Raise InputError if the rank of the constraints at a state (1,) is less than near it, and SceneError
     where a spring acts abruptly, see ``refuse_abrupt_springs``."""
     t, rank = float(at.times[0]), tangent_ranks(model, at)[0]
