@@ -5,15 +5,15 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Sequence
-from pathlib import Path
+from functools import partial
 
 from rich.box import SIMPLE
 from rich.table import Table
 
 from crosscheck.cli import request
-from crosscheck.cli.rendering import write_page
 from crosscheck.cli.running import COMPLETED, OTHERWISE, console, notice, print_json
 from crosscheck.cli.scene_request import find_scenes
+from crosscheck.cli.stored_tables import measured, some
 from crosscheck.derivatives import compare, records, sentences, table
 from crosscheck.derivatives.cards import CARDS, Verdict
 from crosscheck.derivatives.mechanisms import MECHANISMS
@@ -106,13 +106,9 @@ def _scenes(paths: Sequence[str]) -> list[Scene]:
 
 def _stored(arguments: argparse.Namespace) -> int:
     """Measure engines and write the page if requested, and print the stored records."""
-    path = Path(arguments.records)
-    if arguments.run:
-        records.measure(request.find_engines(arguments.engine or ["all"], notice), path, report=notice)
-    if status := write_page("derivatives", path, arguments.page):
+    if status := measured(arguments, "derivatives", partial(records.measure, report=notice)):
         return status
-    if not (stored := table.ordered(records.read(path))):
-        raise request.RequestError(f"{path}: has no records; --run measures engines and writes them")
+    stored = table.ordered(some(records.read, arguments.records))
     refused = [
         {"engine": r["engine"], "scene": r["scene"], "reason": f"{r['reason']} ({r['owner']})"}
         for r in stored

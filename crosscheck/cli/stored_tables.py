@@ -4,7 +4,8 @@ alternatives, small motions."""
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -39,13 +40,15 @@ ENGINES = ("mujoco", "pinocchio", "exudyn", "simbody", "dart", "drake")
 
 def closed_loops(arguments: argparse.Namespace) -> int:
     """Measure engines and write the page if requested, and print the table of engines and mechanisms."""
-    _check_engine(arguments)
-    path = Path(arguments.records)
-    if arguments.run:
-        _measure(arguments, path)
-    if status := write_page("closed-loops", path, arguments.page):
+
+    def measure(engines: list[str], path: Path) -> None:
+        wanted, unable = closed.cases(engines, arguments.family, path)
+        with progress_of("measuring", len(wanted)) as progress:
+            closed.measure(wanted, unable, path, progress)
+
+    if status := measured(arguments, "closed-loops", measure):
         return status
-    found = _some(read_runs(path), path)
+    found = some(read_runs, arguments.records)
     cells = matrix(found)
     for is_best in (True, False):
         console().print(_errors(cells, is_best))
@@ -54,11 +57,24 @@ def closed_loops(arguments: argparse.Namespace) -> int:
     return COMPLETED
 
 
-def _measure(arguments: argparse.Namespace, path: Path) -> None:
-    engines = request.find_engines(arguments.engine or ["all"], notice)
-    wanted, unable = closed.cases(engines, arguments.family, path)
-    with progress_of("measuring", len(wanted)) as progress:
-        closed.measure(wanted, unable, path, progress)
+def measured(arguments: argparse.Namespace, page: str, measure: Callable[[list[str], Path], None]) -> int:
+    """Measure engines and write a page if requested; return the exit status.
+
+    Raises RequestError for an engine that no run measures.
+    """
+    _check_engine(arguments)
+    path = Path(arguments.records)
+    if arguments.run:
+        measure(request.find_engines(arguments.engine or ["all"], notice), path)
+    return write_page(page, path, arguments.page)
+
+
+def some(read: Callable[[Path], list[Record]], file: str) -> list[Record]:
+    """Return the records of a file; raises RequestError if there are none."""
+    path = Path(file)
+    if not (found := read(path)):
+        raise request.RequestError(f"{path}: has no records; --run measures engines and writes them")
+    return found
 
 
 def _errors(cells: dict[str, dict[str, Cell]], is_best: bool) -> Table:
@@ -80,20 +96,19 @@ def _legend(out: Console) -> None:
 
 def convergence(arguments: argparse.Namespace) -> int:
     """Measure engines and write the page if requested, and print the table of errors and orders."""
-    _check_engine(arguments)
-    path = Path(arguments.records)
-    if arguments.run:
-        engines = request.find_engines(arguments.engine or ["all"], notice)
+
+    def measure(engines: list[str], path: Path) -> None:
         if arguments.every_scene:
             ladders.measure(engines, every_scene.FILE, notice, every_scene.ROWS, every_scene.mechanisms())
         else:
             ladders.measure(engines, path, notice)
-    if status := write_page("convergence", path, arguments.page):
+
+    if status := measured(arguments, "convergence", measure):
         return status
     if arguments.every_scene:
         console().print(_of_scenes())
         return COMPLETED
-    runs = _some(read_runs(path), path)
+    runs = some(read_runs, arguments.records)
     rows = orders.table(runs)
     console().print(_orders(rows))
     _name_left_out(runs, [r for row in rows.values() for cell in row.values() for r in cell])
@@ -125,13 +140,6 @@ def _check_engine(arguments: argparse.Namespace) -> None:
         )
 
 
-def _some(records: list[Record], path: Path) -> list[Record]:
-    """Return the records of a file; raises RequestError if there are none."""
-    if not records:
-        raise request.RequestError(f"{path}: has no records; --run measures engines and writes them")
-    return records
-
-
 def _name_left_out(records: Sequence[Record], shown: Sequence[Record]) -> None:
     """Print which records belong to no row and column of a table."""
     keys = {record["key"] for record in shown}
@@ -142,13 +150,9 @@ def _name_left_out(records: Sequence[Record], shown: Sequence[Record]) -> None:
 
 def invariants(arguments: argparse.Namespace) -> int:
     """Measure engines and write the page if requested, and print the tables of invariants and laws."""
-    _check_engine(arguments)
-    path = Path(arguments.records)
-    if arguments.run:
-        kept.measure(request.find_engines(arguments.engine or ["all"], notice), path, notice)
-    if status := write_page("invariants", path, arguments.page):
+    if status := measured(arguments, "invariants", partial(kept.measure, report=notice)):
         return status
-    runs = _some(kept.read(path), path)
+    runs = some(kept.read, arguments.records)
     known = {column.experiment for column in laws.COLUMNS}
     _name_left_out(runs, [record for record in runs if record["experiment"] in known])
     for title, found in laws.tables(runs).items():
@@ -162,14 +166,10 @@ def invariants(arguments: argparse.Namespace) -> int:
 def alternatives(arguments: argparse.Namespace) -> int:
     """Measure engines and write the page if requested, and print a line for each engine and for each
     cause of differences above a limit."""
-    _check_engine(arguments)
-    path = Path(arguments.records)
-    if arguments.run:
-        engines = request.find_engines(arguments.engine or ["all"], notice)
-        agreeing.measure(engines, path, arguments.mechanisms, notice)
-    if status := write_page("alternatives", path, arguments.page):
+    measure = partial(agreeing.measure, graphs=arguments.mechanisms, report=notice)
+    if status := measured(arguments, "alternatives", measure):
         return status
-    found = of_alternatives.engines(_some(agreeing.read(path), path))
+    found = of_alternatives.engines(some(agreeing.read, arguments.records))
     table = Table(*of_alternatives.HEADER, title="ways to solve the same equations", box=SIMPLE)
     for records in found.values():
         table.add_row(*of_alternatives.line(records))
