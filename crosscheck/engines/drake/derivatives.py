@@ -15,9 +15,9 @@ import numpy as np
 from crosscheck.differentiating import Differentiating, OwnDerivatives
 from crosscheck.engines.drake.model import ANGULAR_FIRST, Mechanism
 from crosscheck.engines.shared.initial_velocities import initial_rates
+from crosscheck.engines.shared.least_change import REDUNDANT
 from crosscheck.engines.shared.rates import names_of_rates, spins_of_rods
 from crosscheck.engines.shared.spanning_tree import GROUND_LINK, spanning_tree
-from crosscheck.engines.shared.terms import REDUNDANT
 from mbref.scene import Scene
 
 TERMS = "terms, AutoDiffXd"

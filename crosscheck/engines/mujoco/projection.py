@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from crosscheck.engines.mujoco.context import NOTHING
 from crosscheck.engines.shared.driver_motion import motion
+from crosscheck.engines.shared.least_change import least_change, root_of_mass
 from crosscheck.engines.shared.sampling import Failed
 from mbref.motions.trajectory import Outcome
 from mbref.scene import Driver
@@ -17,7 +17,6 @@ from mbref.scene import Driver
 ITERATIONS = 10  # largest number of Newton iterations; usually two suffice
 CLOSED = 1e-13  # m and rad; residual at which Newton's method ends
 CLOSED_ENOUGH = 1e-8  # m and rad; largest residual of a result
-REDUNDANT = 1e-7  # singular value / largest singular value; smaller values belong to redundant rows
 
 # function that returns the driven constraint rows of the present data
 Rows = Callable[[], Sequence[tuple[int, Driver]]]
@@ -39,7 +38,7 @@ def projected(
     """
     load(t, y)
     mujoco.mj_forward(model, data)
-    q, v, root = data.qpos.copy(), data.qvel.copy(), _root_of_mass(mujoco, model, data, t)
+    q, v, root = data.qpos.copy(), data.qvel.copy(), root_of_mass(_mass(mujoco, model, data), t)
     for _ in range(ITERATIONS):
         load(t, np.concatenate((q, v)))
         mujoco.mj_forward(model, data)
@@ -51,10 +50,10 @@ def projected(
             rates[row] = rate
         if not abs(values).max(initial=0.0) > CLOSED:
             break
-        mujoco.mj_integratePos(model, q, _least(root, jacobian, -values, t), 1.0)
+        mujoco.mj_integratePos(model, q, least_change(root, jacobian, -values, t), 1.0)
     if not abs(values).max(initial=0.0) < CLOSED_ENOUGH:
         raise Failed(Outcome.NOT_CONVERGED, t, f"the closures could not be met at {t:.6g} s")
-    return np.concatenate((q, v + _least(root, jacobian, rates - jacobian @ v, t)))
+    return np.concatenate((q, v + least_change(root, jacobian, rates - jacobian @ v, t)))
 
 
 def _unrounded(jacobian: np.ndarray, extent: float) -> np.ndarray:
@@ -63,20 +62,8 @@ def _unrounded(jacobian: np.ndarray, extent: float) -> np.ndarray:
     return np.where(largest > NOTHING * max(1.0, extent), jacobian, 0.0)
 
 
-def _root_of_mass(mujoco: Any, model: Any, data: Any, t: float) -> np.ndarray:
-    """Return the lower Cholesky factor (nv, nv) of the mass matrix."""
+def _mass(mujoco: Any, model: Any, data: Any) -> np.ndarray:
+    """Return the mass matrix (nv, nv)."""
     mass = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, mass)
-    if not np.isfinite(mass).all():
-        raise Failed(Outcome.NOT_FINITE, t, f"the state is not finite at {t:.6g} s")
-    return np.linalg.cholesky(mass)
-
-
-def _least(root: np.ndarray, jacobian: np.ndarray, wanted: np.ndarray, t: float) -> np.ndarray:
-    """Return the change (nv,) of the velocities of least kinetic energy for which the rows have the wanted
-    values."""
-    if not (np.isfinite(jacobian).all() and np.isfinite(wanted).all()):
-        raise Failed(Outcome.NOT_FINITE, t, f"the closure errors are not finite at {t:.6g} s")
-    spread = solve_triangular(root, jacobian.T, lower=True).T
-    least = np.linalg.lstsq(spread, wanted, rcond=REDUNDANT)[0]
-    return solve_triangular(root, least, lower=True, trans="T")
+    return mass

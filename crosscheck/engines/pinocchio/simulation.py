@@ -8,7 +8,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from crosscheck.engine import Setting
 from crosscheck.engines.pinocchio import compiled_run
@@ -25,6 +24,7 @@ from crosscheck.engines.pinocchio.families import (
 from crosscheck.engines.pinocchio.model import Loads, Mechanism
 from crosscheck.engines.pinocchio.new_models import NewModels
 from crosscheck.engines.shared.driver_motion import motion, stated_rate
+from crosscheck.engines.shared.least_change import least_change, root_of_mass
 from crosscheck.engines.shared.sampling import Adaptive, Counts, Failed, Sample, rk4
 from crosscheck.engines.shared.tree_reactions import LinkMotion, sample_of
 from crosscheck.judge.constraints import scene_length
@@ -42,7 +42,6 @@ FORCES = (
 )  # solver parameters for forces of redundant closures, whose rounding errors grow as 1/mu
 PROJECTIONS = 10  # largest number of Newton iterations; two are usual
 CLOSED = 1e-13  # m and rad; residual at which a projection ends
-REDUNDANT = 1e-7  # singular value / largest singular value; smaller values belong to redundant rows
 NOTHING = 1e-12  # smaller entries of closure rows, relative to the scene's length, are rounding
 CLOSED_ENOUGH = 1e-8  # m and rad; largest residual of a result
 # rad; a driver moves by at most this in one adaptive step, since closures may change branch within larger
@@ -184,7 +183,7 @@ class Simulation:
         q, v = self.split(t, y)
         if not len(self.closures):
             return np.concatenate((q, v))
-        root = self._root_of_mass(t, q)
+        root = root_of_mass(self.pin.crba(self.model, self.data, q)[np.ix_(self.free, self.free)], t)
         for _ in range(PROJECTIONS):
             residual, jacobian = self.closure_errors(q)
             if not abs(residual).max() > CLOSED:
@@ -194,13 +193,6 @@ class Simulation:
             raise Failed(Outcome.NOT_CONVERGED, t, f"the closures could not be met at {t:.6g} s")
         v = v - self._least_change(t, root, jacobian, jacobian @ v)
         return np.concatenate((q, v))
-
-    def _root_of_mass(self, t: float, q: np.ndarray) -> np.ndarray:
-        """Return the lower Cholesky factor of the mass matrix of the coordinates that are not driven."""
-        mass = self.pin.crba(self.model, self.data, q)[np.ix_(self.free, self.free)]
-        if not np.isfinite(mass).all():
-            raise Failed(Outcome.NOT_FINITE, t, f"the state is not finite at {t:.6g} s")
-        return np.linalg.cholesky(mass)
 
     def closure_errors(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return closure residuals (rows,), m and rad, and the Jacobian (rows, nv): d residual = -J dq."""
@@ -220,11 +212,7 @@ class Simulation:
     ) -> np.ndarray:
         """Return the dv (nv,) of least kinetic energy, zero in driven coordinates, with J dv = target."""
         change = np.zeros(self.model.nv)
-        if not (np.isfinite(jacobian).all() and np.isfinite(target).all()):
-            raise Failed(Outcome.NOT_FINITE, t, f"the closure errors are not finite at {t:.6g} s")
-        spread = solve_triangular(root, jacobian[:, self.free].T, lower=True).T
-        least = np.linalg.lstsq(spread, target, rcond=REDUNDANT)[0]
-        change[self.free] = solve_triangular(root, least, lower=True, trans="T")
+        change[self.free] = least_change(root, jacobian[:, self.free], target, t)
         return change
 
     def sample(self, t: float) -> Sample:

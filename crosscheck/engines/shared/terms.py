@@ -24,6 +24,7 @@ from crosscheck.engines.shared.driver_motion import motion, stated_rate
 from crosscheck.engines.shared.geometry import cross_matrix
 from crosscheck.engines.shared.initial_velocities import initial_rates
 from crosscheck.engines.shared.joint_coordinates import JointCoordinates, rotation_vector
+from crosscheck.engines.shared.least_change import REDUNDANT, least_change, root_of_mass
 from crosscheck.engines.shared.sampling import Adaptive, Counts, Failed, Sample
 from crosscheck.engines.shared.spanning_tree import GROUND_LINK, Tree
 from crosscheck.engines.shared.tree_reactions import LinkMotion, applied, sample_of, wrench
@@ -42,7 +43,6 @@ TURN_PER_STEP = 0.25
 PROJECTIONS = 10  # largest number of Newton iterations; two are usual
 CLOSED = 1e-13  # m and rad; residual at which a projection ends
 CLOSED_ENOUGH = 1e-8  # m and rad; largest residual of a result
-REDUNDANT = 1e-7  # singular value / largest singular value; smaller values belong to redundant rows
 
 
 ROUNDED = 1e-13  # entry of a closure's row / largest entry of its two ends; smaller entries are rounding
@@ -170,10 +170,11 @@ class Simulation:
         acting = self._forces(terms, motion_now) - terms.bias - terms.mass @ a
         gamma = -rows.drift - rows.jacobian @ a
         root = self._root(t, terms)
-        if not np.isfinite(acting).all():
-            raise Failed(Outcome.NOT_FINITE, t, f"the forces are not finite at {t:.6g} s")
+        for what, values in (("forces", acting), ("closures", rows.jacobian)):
+            if not np.isfinite(values).all():
+                raise Failed(Outcome.NOT_FINITE, t, f"the {what} are not finite at {t:.6g} s")
         pushed = solve_triangular(root, acting[self.free], lower=True)
-        spread = self._spread(t, root, rows.jacobian)
+        spread = solve_triangular(root, rows.jacobian[:, self.free].T, lower=True).T
         held = np.linalg.lstsq(spread, gamma - spread @ pushed, rcond=REDUNDANT)[0]
         a[self.free] = solve_triangular(root, pushed + held, lower=True, trans="T")
         multipliers = np.linalg.lstsq(spread.T, held, rcond=REDUNDANT)[0]
@@ -277,20 +278,11 @@ class Simulation:
 
     def _root(self, t: float, terms: Terms) -> np.ndarray:
         """Return the lower Cholesky factor of the mass matrix of the coordinates that are not driven."""
-        mass = terms.mass[np.ix_(self.free, self.free)]
-        if not np.isfinite(mass).all():
-            raise Failed(Outcome.NOT_FINITE, t, f"the state is not finite at {t:.6g} s")
-        return np.linalg.cholesky(mass)
-
-    def _spread(self, t: float, root: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
-        if not np.isfinite(jacobian).all():
-            raise Failed(Outcome.NOT_FINITE, t, f"the closures are not finite at {t:.6g} s")
-        return solve_triangular(root, jacobian[:, self.free].T, lower=True).T
+        return root_of_mass(terms.mass[np.ix_(self.free, self.free)], t)
 
     def _least(self, t: float, root: np.ndarray, jacobian: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         """Return the change (nv,) of least kinetic energy, zero in driven coordinates, for which the rows
         have the wanted values."""
-        spread, change = self._spread(t, root, jacobian), np.zeros(self.at.nv)
-        least = np.linalg.lstsq(spread, wanted, rcond=REDUNDANT)[0]
-        change[self.free] = solve_triangular(root, least, lower=True, trans="T")
+        change = np.zeros(self.at.nv)
+        change[self.free] = least_change(root, jacobian[:, self.free], wanted, t)
         return change
