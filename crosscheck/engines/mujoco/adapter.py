@@ -31,7 +31,7 @@ from crosscheck.engines.mujoco.ways import ALTERNATIVES
 from crosscheck.engines.shared.driver_motion import fastest_rate
 from crosscheck.engines.shared.initial_velocities import lacks_mass
 from crosscheck.engines.shared.planar_scene import planar_scene
-from crosscheck.engines.shared.sampling import run_through
+from crosscheck.engines.shared.sampling import labels_of, run_through
 from crosscheck.engines.shared.switched import refusal, served
 from crosscheck.judge.pieces import at_start
 from mbref.motions.trajectory import Trajectory
@@ -100,12 +100,7 @@ class MuJoCo(linearised.Linearised, derivatives.Differentiated, Engine):
         if setting.family in COMPILED and (planar := planar_scene(scene)) is not scene:
             return replace(self.run(planar, times, setting), reactions=None)
         start = time.process_time()
-        labels = {
-            "engine": self.name,
-            "version": self.version(),
-            "method": setting.family,
-            "settings": dict(setting.options),
-        }
+        labels = labels_of(self, setting)
         if _has_stops(scene):
             stopped = stops.StoppedRun(scene, setting)
             with stopped.run.installed(), np.errstate(all="ignore"):

@@ -32,7 +32,7 @@ from crosscheck.engines.pinocchio.switched import SERVED, ConstraintRun
 from crosscheck.engines.shared.driver_motion import fastest_rate
 from crosscheck.engines.shared.initial_velocities import lacks_mass
 from crosscheck.engines.shared.planar_scene import planar_scene
-from crosscheck.engines.shared.sampling import run_through
+from crosscheck.engines.shared.sampling import labels_of, run_through
 from crosscheck.engines.shared.switched import refusal, served
 from crosscheck.judge.pieces import at_start
 from mbref.motions.trajectory import Trajectory
@@ -96,12 +96,7 @@ class Pinocchio(derivatives.Differentiated, Engine):
             return replace(self.run(planar, times, setting), reactions=None)
         start = time.process_time()
         python = Setting("dop853", setting.options) if setting.family in COMPILED else setting
-        labels = {
-            "engine": self.name,
-            "version": self.version(),
-            "method": setting.family,
-            "settings": dict(setting.options),
-        }
+        labels = labels_of(self, setting)
         if any(intermittent(scene)):
             switched = ConstraintRun(scene, setting)
             with np.errstate(all="ignore"):

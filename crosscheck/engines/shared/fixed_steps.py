@@ -11,7 +11,7 @@ import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Owner, Setting
 from crosscheck.engines.shared.driver_motion import fastest_rate
-from crosscheck.engines.shared.sampling import Counts, Failed, Sample, run_through, step_count
+from crosscheck.engines.shared.sampling import Counts, Failed, Sample, labels_of, run_through, step_count
 from crosscheck.engines.shared.spanning_tree import Closure, Tree
 from crosscheck.engines.shared.tree_reactions import LinkMotion, applied, sample_of
 from crosscheck.judge.constraints import scene_length
@@ -81,12 +81,7 @@ def simulated(
     start = time.process_time()
     with np.errstate(all="ignore"):
         run = make()
-        labels: dict[str, Any] = {
-            "engine": engine.name,
-            "version": engine.version(),
-            "method": setting.family,
-            "settings": dict(setting.options),
-        }
+        labels = labels_of(engine, setting)
         built = time.process_time() - start
         return run_through(scene, times, run.advance, run.sample, run.counts, built, labels)
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import DOP853
 
+from crosscheck.engine import Engine, Setting
 from mbref.motions.trajectory import Cost, Outcome, Trajectory
 from mbref.scene import Scene
 
@@ -116,6 +117,16 @@ def run_through(
         message=message,
         cost=Cost(seconds, build_seconds, counts.steps, counts.rejected, counts.rhs),
     )
+
+
+def labels_of(engine: Engine, setting: Setting) -> dict[str, Any]:
+    """Return a trajectory's engine, version, method and settings."""
+    return {
+        "engine": engine.name,
+        "version": engine.version(),
+        "method": setting.family,
+        "settings": dict(setting.options),
+    }
 
 
 def _finite(sample: Sample) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from crosscheck.engine import Cannot, Engine, Owner, Setting, Supports
 from crosscheck.engines.shared.file_cache import hashed
 from crosscheck.engines.shared.initial_velocities import lacks_mass
-from crosscheck.engines.shared.sampling import Counts, Failed, Sample, run_through
+from crosscheck.engines.shared.sampling import Counts, Failed, Sample, labels_of, run_through
 from crosscheck.engines.shared.symbolic.equations import TreeEquations
 from crosscheck.engines.shared.tree_reactions import joint_reactions
 from crosscheck.setting import unknown_family
@@ -78,12 +78,7 @@ class Generator(Engine):
     ) -> Trajectory:
         """Return the trajectory at the reached states (k, 2 n); ``failure`` is the reason for an early
         end."""
-        labels = {
-            "engine": self.name,
-            "version": self.version(),
-            "method": setting.family,
-            "settings": dict(setting.options),
-        }
+        labels = labels_of(self, setting)
         reached = iter(states)
 
         def advance(_: float, target: float) -> None:
