@@ -15,12 +15,13 @@ import numpy as np
 from crosscheck.derivatives.compare import derivative
 from crosscheck.judge.constraints import (
     closure_accelerations,
-    inertia_matrices,
     initial_poses,
     initial_twists,
     jacobian,
 )
-from crosscheck.judge.gauss_motion import accelerations, applied
+from crosscheck.judge.gauss_motion import accelerations
+from crosscheck.judge.joint_loads import applied
+from crosscheck.judge.loads import mass_matrix, world_inertia
 from mbref import rotations
 from mbref.scene import Scene
 
@@ -87,15 +88,8 @@ class State(NamedTuple):
 
     def masses(self) -> np.ndarray:
         """Return the mass matrix (6 nb, 6 nb) at the centres of mass, world."""
-        turn = rotations.to_matrix(self.pose[1])
-        inertia = turn @ inertia_matrices(self.scene) @ np.swapaxes(turn, 1, 2)
-        n = 6 * len(self.scene.body)
-        found = np.zeros((n, n))
-        for b, body in enumerate(self.scene.body):
-            place = slice(6 * b, 6 * b + 6)
-            found[place, place] = np.diag([body.mass or 0.0] * 3 + [0.0] * 3)
-            found[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = inertia[b]
-        return found
+        inertia = world_inertia(self.scene, rotations.to_matrix(self.pose[1]))
+        return mass_matrix(self.scene, inertia)
 
     def lacking(self, acceleration: np.ndarray) -> np.ndarray:
         """Return M a - f (6 nb,), the forces of joints, of which f has gravity and gyroscopic moments."""

@@ -17,10 +17,10 @@ from crosscheck.judge.constraints import (
     scene_length,
 )
 from crosscheck.judge.coupling_laws import unwound
-from crosscheck.judge.gauss_motion import State, applied
 from crosscheck.judge.gauss_principle import of_least_constraint
 from crosscheck.judge.joint_coordinates import Reflected, reflected
-from crosscheck.judge.joint_loads import turning_loads
+from crosscheck.judge.joint_loads import State, applied, turning_loads
+from crosscheck.judge.loads import mass_matrix, world_inertia
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Force, Load, Moment, Scene, Spring
@@ -83,8 +83,10 @@ def terms_at(scene: Scene, motion: Trajectory, sample: int) -> Terms:
         for name, found in closure_accelerations(scene, t, position, orientation, *[still] * 4).items()
         for _ in found
     )
-    mass, armatures = _mass(scene, orientation), reflected(scene, *state[:4])
-    return Terms(mass, armatures, _forces(scene, t, state), rows, names, driven - moved, -driven)
+    mass = mass_matrix(scene, world_inertia(scene, rotations.to_matrix(orientation)))
+    return Terms(
+        mass, reflected(scene, *state[:4]), _forces(scene, t, state), rows, names, driven - moved, -driven
+    )
 
 
 def accelerations(scene: Scene, terms: Terms) -> np.ndarray:
@@ -108,7 +110,7 @@ def variants(scene: Scene, orientation: np.ndarray, terms: Terms) -> Iterator[Va
         "products of inertia left out": turn @ diagonal @ back,
     }
     for change, inertia in others.items():
-        yield Variant(PARTS[0], change, terms._replace(mass=_mass(scene, orientation, inertia)))
+        yield Variant(PARTS[0], change, terms._replace(mass=mass_matrix(scene, inertia)))
     for joint in dict.fromkeys(terms.joints):
         kept = np.array([name != joint for name in terms.joints])
         rows = {key: getattr(terms, key)[kept] for key in ("rows", "of_velocities", "of_drivers")}
@@ -217,16 +219,3 @@ def _name(place: int, load: Load) -> str:
         return f"load[{place}] (spring between {' and '.join(map(repr, load.bodies))})"
     where = f"on {load.body!r}" if isinstance(load, Moment | Force) else f"at {load.joint!r}"
     return f"load[{place}] ({load.type} {where})"
-
-
-def _mass(scene: Scene, orientation: np.ndarray, inertia: np.ndarray | None = None) -> np.ndarray:
-    """Return the mass matrix (6 nb, 6 nb) for inertias (nb, 3, 3) along world axes; by default they are
-    rotated with the bodies."""
-    if inertia is None:
-        turn = rotations.to_matrix(orientation)
-        inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
-    mass = np.zeros((6 * len(scene.body), 6 * len(scene.body)))
-    for b, body in enumerate(scene.body):
-        mass[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = (body.mass or 0.0) * np.eye(3)
-        mass[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = inertia[b]
-    return mass

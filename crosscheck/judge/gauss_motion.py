@@ -22,20 +22,17 @@ from crosscheck.judge.deadline import ask
 from crosscheck.judge.energy import kinetic_energy
 from crosscheck.judge.gauss_principle import rank as rank_at_start
 from crosscheck.judge.joint_coordinates import reflected
-from crosscheck.judge.joint_loads import joint_wrenches, turning_loads
-from crosscheck.judge.loads import Motion, wrenches
+from crosscheck.judge.joint_loads import State, applied, turning_loads
+from crosscheck.judge.loads import mass_matrix, world_inertia
 from crosscheck.judge.time_functions import next_end
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory
-from mbref.rotations import cross
 from mbref.scene import Scene
 
 NAME = "Gauss's principle"
 RTOL = 1e-10
 WITHOUT_INERTIA = 1e-13  # fraction of the trace; a smaller least moment of inertia is rounding of zero
-NO_AXIS = np.zeros(3)  # loads of joints are added here, along their joints' coordinates
-State = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 @functools.lru_cache(maxsize=128)
@@ -95,14 +92,13 @@ def accelerations(
     of time are of the piece that acts from ``since`` (s) on.
     """
     position, orientation, velocity, spin, _ = state
-    turn = rotations.to_matrix(orientation)
     force = applied(scene, t, state, since)
-    inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
     is_singular = has_singular_mass(scene)
     if is_singular or any(joint.reflected_inertia for joint in scene.joint):
         return _with_coupled_masses(scene, t, state, force, rank, is_singular)
     roots = np.zeros((len(scene.body), 6, 6))  # W with WᵀW the mass matrix
     roots[:, :3, :3] = np.sqrt([body.mass or 0.0 for body in scene.body])[:, None, None] * np.eye(3)
+    inertia = world_inertia(scene, rotations.to_matrix(orientation))
     roots[:, 3:, 3:] = np.swapaxes(np.linalg.cholesky(inertia), 1, 2)
     inverses = np.linalg.inv(roots)
     unbound = np.einsum("bji,bj->bi", inverses, force)
@@ -130,13 +126,9 @@ def _with_coupled_masses(
     """Return the ``accelerations`` of a scene whose armatures couple the bodies in the mass matrix, or whose
     mass matrix is singular because of massless links, points or thin rods."""
     position, orientation, velocity, spin, _ = state
-    turn = rotations.to_matrix(orientation)
     armatures = reflected(scene, position, orientation, velocity, spin)
-    mass = armatures.mass
-    for b, body in enumerate(scene.body):
-        at = slice(6 * b, 6 * b + 3), slice(6 * b + 3, 6 * b + 6)
-        mass[at[0], at[0]] += (body.mass or 0.0) * np.eye(3)
-        mass[at[1], at[1]] += turn[b] @ inertia_matrices(scene)[b] @ turn[b].T
+    inertia = world_inertia(scene, rotations.to_matrix(orientation))
+    mass = armatures.mass + mass_matrix(scene, inertia)
     rows, _ = jacobian(scene, t, position, orientation)
     still = np.zeros_like(position)
     bias = closure_accelerations(scene, t, position, orientation, velocity, spin, still, still)
@@ -174,20 +166,6 @@ def _least(matrix: np.ndarray, wanted: np.ndarray, rank: int | None) -> np.ndarr
     u, s, vt = np.linalg.svd(matrix, full_matrices=False)
     r = int(np.sum(s > RANK * s[0])) if rank is None else rank
     return vt[:r].T @ (u[:, :r].T @ wanted / s[:r])
-
-
-def applied(scene: Scene, t: float, state: State, since: float | None = None) -> np.ndarray:
-    """Return forces and moments about the centres of mass (nb, 6), world: gravity, loads, gyroscopic
-    moments."""
-    position, orientation, velocity, spin, angles = state
-    turn = rotations.to_matrix(orientation)
-    still = np.zeros((1, len(position)))
-    motion = Motion(position[None], turn[None], velocity[None], spin[None], still)
-    force, moment = (w[0] for w in wrenches(scene, motion, NO_AXIS, t, since))
-    of_joints = joint_wrenches(scene, t, (position, orientation), (velocity, spin), angles, since)
-    inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
-    gyroscopic = cross(spin, np.einsum("bij,bj->bi", inertia, spin))
-    return np.hstack([force, moment - gyroscopic]) + of_joints
 
 
 def power(scene: Scene, t: float, state: State) -> float:

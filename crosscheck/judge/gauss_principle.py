@@ -7,15 +7,14 @@ import numpy as np
 
 from crosscheck.judge.constraints import (
     closure_accelerations,
-    inertia_matrices,
     initial_poses,
     initial_twists,
     jacobian,
     scene_length,
 )
 from crosscheck.judge.joint_coordinates import reflected
-from crosscheck.judge.joint_loads import joint_wrenches
-from crosscheck.judge.loads import Motion, wrenches
+from crosscheck.judge.joint_loads import applied
+from crosscheck.judge.loads import mass_matrix, world_inertia
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
@@ -23,7 +22,6 @@ from mbref.scene import Scene
 
 # relative residual of the accelerations; a larger residual shows that the mobility is infinitesimal only
 CONTINUES = 1e-8
-NO_AXIS = np.zeros(3)  # no shared axis of turning: loads of joints are added here
 
 
 def gauss(scene: Scene) -> np.ndarray:
@@ -59,24 +57,11 @@ def of_least_constraint(
 def unbound(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     """Return the mass matrix M (6 nb, 6 nb) of the twists at t = 0, and the forces f (6 nb,) of loads and
     gyroscopic moments."""
-    position, orientation = initial_poses(scene)
-    velocity, angular_velocity = initial_twists(scene)
-    turn = rotations.to_matrix(orientation)
-    no_turn = np.zeros((1, len(position)))
-    motion = Motion(position[None], turn[None], velocity[None], angular_velocity[None], no_turn)
-    force, moment = (w[0] for w in wrenches(scene, motion, NO_AXIS))
-    inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
-    momentum = np.einsum("bij,bj->bi", inertia, angular_velocity)
-    moment = moment - np.cross(angular_velocity, momentum)
-    mass = np.zeros((6 * len(position), 6 * len(position)))
-    for b, body in enumerate(scene.body):
-        mass[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = (body.mass or 0.0) * np.eye(3)
-        mass[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = inertia[b]
-    armatures = reflected(scene, position, orientation, velocity, angular_velocity)
-    pose, twist, angles = (position, orientation), (velocity, angular_velocity), np.zeros(len(scene.load))
-    of_joints = joint_wrenches(scene, 0.0, pose, twist, angles)
-    total = np.hstack([force, moment]) + of_joints
-    return mass + armatures.mass, total.ravel() + armatures.force
+    pose, twist = initial_poses(scene), initial_twists(scene)
+    mass = mass_matrix(scene, world_inertia(scene, rotations.to_matrix(pose[1])))
+    armatures = reflected(scene, *pose, *twist)
+    force = applied(scene, 0.0, (*pose, *twist, np.zeros(len(scene.load)))).ravel()
+    return mass + armatures.mass, force + armatures.force
 
 
 def singular_values(scene: Scene) -> np.ndarray:

@@ -16,7 +16,7 @@ from scipy.optimize import nnls
 from crosscheck.judge.constraints import jacobian
 from crosscheck.judge.joint_coordinates import Reflected, reflected
 from crosscheck.judge.joint_reactions import of_multipliers, on_second, unit_rows
-from crosscheck.judge.loads import world_inertia
+from crosscheck.judge.loads import mass_matrix, world_inertia
 from crosscheck.judge.pieces import State, without_rounding
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
@@ -77,13 +77,9 @@ def pushing(after: Scene, state: State, gaps: np.ndarray, least: np.ndarray) -> 
 
 def _mass_matrix(scene: Scene, state: State) -> tuple[np.ndarray, Reflected]:
     """Return the mass matrix (6 nb, 6 nb) of the bodies and armatures, and the armatures."""
-    n = 6 * len(scene.body)
-    blocks = np.zeros((len(scene.body), 6, len(scene.body), 6))
-    for b, body in enumerate(scene.body):
-        blocks[b, :3, b, :3] = (body.mass or 0.0) * np.eye(3)
-        blocks[b, 3:, b, 3:] = world_inertia(scene, rotations.to_matrix(state.orientation[None]))[0, b]
+    inertia = world_inertia(scene, rotations.to_matrix(state.orientation))
     geared = reflected(scene, *state)
-    return blocks.reshape(n, n) + geared.mass, geared
+    return mass_matrix(scene, inertia) + geared.mass, geared
 
 
 def _change(scene: Scene, rows: np.ndarray, rhs: np.ndarray, mass: np.ndarray) -> np.ndarray:

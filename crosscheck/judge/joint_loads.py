@@ -7,9 +7,16 @@ import numpy as np
 
 from crosscheck.judge.joint_coordinates import COORDINATES, coordinate_jacobian, coordinates
 from crosscheck.judge.joint_residuals import grounded, joint_frames, with_ground
+from crosscheck.judge.loads import Motion, world_inertia, wrenches
 from crosscheck.judge.time_functions import value
+from mbref import rotations
+from mbref.rotations import cross
 from mbref.scene import JointLoad, Scene
 from mbref.scene.joints import ANGLE
+
+NO_AXIS = np.zeros(3)  # loads of joints are added here, along their joints' coordinates
+# position (nb, 3), unit orientation (nb, 4), velocity, spin (nb, 3), and angles of `turning_loads`
+State = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 def joint_loads(scene: Scene) -> list[JointLoad]:
@@ -53,3 +60,17 @@ def _displacement(scene: Scene, name: str, pose: tuple[np.ndarray, np.ndarray]) 
     position, orientation = (part[None] for part in with_ground(*pose))
     still = grounded(np.zeros((1, len(pose[0]), 3)))
     return float(coordinates(joint, np.zeros(1), position, orientation, still)[0, 1])
+
+
+def applied(scene: Scene, t: float, state: State, since: float | None = None) -> np.ndarray:
+    """Return forces and moments about the centres of mass (nb, 6), world: gravity, loads, gyroscopic
+    moments."""
+    position, orientation, velocity, spin, angles = state
+    turn = rotations.to_matrix(orientation)
+    still = np.zeros((1, len(position)))
+    motion = Motion(position[None], turn[None], velocity[None], spin[None], still)
+    force, moment = (w[0] for w in wrenches(scene, motion, NO_AXIS, t, since))
+    of_joints = joint_wrenches(scene, t, (position, orientation), (velocity, spin), angles, since)
+    inertia = world_inertia(scene, turn)
+    gyroscopic = cross(spin, np.einsum("bij,bj->bi", inertia, spin))
+    return np.hstack([force, moment - gyroscopic]) + of_joints

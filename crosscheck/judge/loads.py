@@ -157,6 +157,16 @@ def world_inertia(scene: Scene, rotation: np.ndarray) -> np.ndarray:
     return rotation @ inertia_matrices(scene) @ np.swapaxes(rotation, -1, -2)
 
 
+def mass_matrix(scene: Scene, inertia: np.ndarray) -> np.ndarray:
+    """Return the mass matrix (6 nb, 6 nb) of velocities and angular velocities, body after body, for inertias
+    (nb, 3, 3) along world axes."""
+    found = np.zeros((6 * len(inertia), 6 * len(inertia)))
+    for b, body in enumerate(scene.body):
+        found[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = (body.mass or 0.0) * np.eye(3)
+        found[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = inertia[b]
+    return found
+
+
 def initial_rotations(scene: Scene) -> np.ndarray:
     """Return rotation matrices (nb, 3, 3), body to world, at t = 0."""
     return rotations.to_matrix(initial_poses(scene)[1])

@@ -10,9 +10,8 @@ import numpy as np
 from crosscheck.judge.constraints import jacobian, joint_coordinates, scene_length
 from crosscheck.judge.coupling_laws import unwound
 from crosscheck.judge.deadline import ask
-from crosscheck.judge.gauss_motion import applied
 from crosscheck.judge.joint_coordinates import reflected
-from crosscheck.judge.joint_loads import turning_loads
+from crosscheck.judge.joint_loads import applied, turning_loads
 from crosscheck.judge.joint_reactions import (
     LEAST,
     along_coordinate,

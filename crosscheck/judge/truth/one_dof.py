@@ -17,6 +17,7 @@ import numpy as np
 from crosscheck.judge import constraints
 from crosscheck.judge.loads import Motion, world_inertia, wrenches
 from crosscheck.judge.reference.start_velocities import given
+from crosscheck.judge.reference.vectors import apply
 from crosscheck.judge.time_functions import value
 from crosscheck.judge.tolerances import FREEDOM, ON_PATH, PARALLEL, TRUTH_DRIVEN, TRUTH_DYNAMIC
 from crosscheck.judge.truth.picard import REAL, NoSolution, Solution
@@ -176,7 +177,7 @@ class Reduced:
         motion = Motion(pose.position, pose.rotation, pose.dposition * dq, pose.spin * dq, pose.turn)
         force, moment = wrenches(self._scene, motion, self._path.axis)
         inertias = world_inertia(self._scene, pose.rotation)
-        momentum, momentum_rate = _times(inertias, pose.spin), _times(inertias, pose.dspin)
+        momentum, momentum_rate = apply(inertias, pose.spin), apply(inertias, pose.dspin)
         mass = self._mass
         inertia = np.sum(mass * pose.dposition**2 + pose.spin * momentum, axis=(1, 2))
         half_slope = np.sum(mass * pose.dposition * pose.ddposition + pose.spin * momentum_rate, axis=(1, 2))
@@ -242,10 +243,6 @@ def trajectory(
         angular_acceleration=spin_rate,
         t_end=float(times[-1]) if len(times) else 0.0,
     )
-
-
-def _times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    return (matrices @ vectors[..., None])[..., 0]
 
 
 def _fits(scene: Scene, path: Path) -> bool:
