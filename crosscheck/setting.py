@@ -35,9 +35,7 @@ class Setting:
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        return self.family + "".join(
-            f" {k}={v:g}" if isinstance(v, float) else f" {k}={v}" for k, v in self.options.items()
-        )
+        return self.family + "".join(f" {k}={option_text(v)}" for k, v in self.options.items())
 
 
 @dataclass(frozen=True)
@@ -54,6 +52,11 @@ class Alternatives:
 
     ways: Mapping[str, Setting]
     within: float = 1e-9
+
+
+def option_text(value: Any) -> str:
+    """Return the value of an option as text, a number in its shortest form."""
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def best_family(settings: Sequence[Setting]) -> list[Setting]:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -233,11 +232,6 @@ def ended_briefly(run: Run) -> str:
     """Return ``20 s`` for a completed run of the paper, otherwise the end time with the footnote or the
     outcome's name."""
     return "20 s" if run.completed else f"{run.t_end:.4g} s {run.outcome.letter or run.outcome.label}"
-
-
-def plain(value: Any) -> str:
-    """Return a setting as text, with numbers in their shortest form."""
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def number(value: float, digits: int = 2) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import string
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Literal
 
 from rich.console import Console
 from rich.table import Table
@@ -14,7 +14,7 @@ from rich.text import Text
 from crosscheck.cli.terminal_plot import scatter
 from crosscheck.engine import Engine, Setting, engine
 from crosscheck.judge.mobility import mobility
-from crosscheck.setting import ORIGIN
+from crosscheck.setting import ORIGIN, option_text
 from crosscheck.study.command import command
 from crosscheck.study.grades import Grade, Judged
 from crosscheck.study.grid import Record
@@ -145,7 +145,7 @@ def _to_set(found: Engine, record: Record) -> str:
     """Return the description of a run's family, and of each of its options."""
     family = found.families.get(record["family"], "")
     options = [
-        f"{n} = {_value(v)} ({found.options[n]})" if n in found.options else f"{n} = {v}"
+        f"{n} = {option_text(v)} ({found.options[n]})" if n in found.options else f"{n} = {v}"
         for n, v in record["asked"]["options"].items()
         if n not in ORIGIN
     ]
@@ -240,11 +240,7 @@ def own_code(scene: Scene, record: Record) -> str:
 
 def _options(record: Record) -> str:
     asked = record["asked"]["options"].items()
-    return ", ".join(f"{name}={_value(value)}" for name, value in asked if name not in ORIGIN)
-
-
-def _value(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return ", ".join(f"{name}={option_text(value)}" for name, value in asked if name not in ORIGIN)
 
 
 def _graded(group: Judged, record: Record) -> str:

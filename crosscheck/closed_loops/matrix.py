@@ -10,6 +10,7 @@ from crosscheck.closed_loops.mechanisms import DIFFICULTIES, Difficulty
 from crosscheck.engine import Owner, engine_names
 from crosscheck.engines.shared.terms import FAMILY as TERMS
 from crosscheck.judge.tolerances import FALSE_SUCCESS, FLOOR
+from crosscheck.setting import option_text
 from crosscheck.study.command import command
 from crosscheck.study.grades import DEFAULTS, Grade, grade
 from crosscheck.study.grid import Record
@@ -134,16 +135,12 @@ def sentence(record: Record) -> str:
     """Return the setting and the error of a record, or the reason of a refusal or an early end."""
     if is_refusal(record):
         return f"refused: {record['message']} ({record['owner']})"
-    options = ", ".join(f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in _options(record))
+    options = ", ".join(f"{k} {option_text(v)}" for k, v in record["asked"]["options"].items())
     how = f"{record['family']} ({options})" if options else record["family"]
     if grade(record) is Grade.FAILED:
         return f"{how}: {ended(record)}. {record['message']}".rstrip(". ") + "."
     seconds = record["cost"]["seconds"]
     return f"{how}: largest error {_size(record)}, {seconds:.2g} s of CPU time"
-
-
-def _options(record: Record) -> Sequence[tuple[str, object]]:
-    return list(record["asked"]["options"].items())
 
 
 def rerun(record: Record) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from crosscheck.judge.reference.cache import mechanism
-from crosscheck.setting import ORIGIN
+from crosscheck.setting import ORIGIN, option_text
 from crosscheck.study.grid import Record
 from mbref.motions.trajectory import Outcome
 from mbref.records import finite
@@ -130,7 +130,7 @@ def varied_settings(record: Record, records: Sequence[Record]) -> str:
     if len(settings) == 1:
         own = {k: v for k, v in record["asked"]["options"].items() if k not in ORIGIN}
         names = list(own)
-    return ", ".join(f"{k}={own[k]:g}" if isinstance(own[k], float) else f"{k}={own[k]}" for k in names)
+    return ", ".join(f"{k}={option_text(own[k])}" for k in names)
 
 
 def with_time(record: Record, known: dict[str, dict[str, Any]]) -> Record:

@@ -10,6 +10,7 @@ import mbref
 from crosscheck.cli.tables import own_code
 from crosscheck.convergence import every_scene
 from crosscheck.findings.finding import findings
+from crosscheck.setting import option_text
 from crosscheck.study.grades import Grade, Judged
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import ended, error_text, is_completed
@@ -18,7 +19,7 @@ from crosscheck.study.words.speed import LEVEL, SAID, title
 from mbref.motions.trajectory import Outcome
 
 from ..blocks import Block, Fold, Heading, Listing, Marked, Parts, Prose, Table, Within
-from ..runs import SceneRuns, duration, plain
+from ..runs import SceneRuns, duration
 from ..stored import groups, verified
 
 REPORTS = Path(__file__).parents[1]
@@ -193,7 +194,7 @@ def _count(number: int, one: str, more: str) -> str:
 
 
 def _run_cells(record: Record) -> tuple[str, str, str]:
-    options = ", ".join(f"{k}={plain(v)}" for k, v in record["asked"]["options"].items())
+    options = ", ".join(f"{k}={option_text(v)}" for k, v in record["asked"]["options"].items())
     return f"`{record['family']}`, {options}", duration(record["cost"]["seconds"]), error_text(record)
 
 

@@ -7,13 +7,13 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from crosscheck.setting import BRANCHES
+from crosscheck.setting import BRANCHES, option_text
 from crosscheck.study.grid import Record
 from mbref.motions.trajectory import Outcome
 
 from .. import mechanisms
 from ..blocks import Block, Heading, Moving, Table, Text
-from ..runs import Run, SceneRuns, plain
+from ..runs import Run, SceneRuns
 
 DIGITS = 12  # decimals of displayed times (s)
 SHOWN = 12  # largest number of singular positions of a motion in the table
@@ -111,7 +111,7 @@ def _open_reactions(run: Run) -> Iterator[str]:
         joints = ", ".join(joint for joint, row in more.items() if row.any())
         yield (
             f"Equilibrium determines fewer components of the reactions of {joints} at t = "
-            f"{', '.join(plain(float(t)) for t in times[:SHOWN])} s than elsewhere."
+            f"{', '.join(option_text(float(t)) for t in times[:SHOWN])} s than elsewhere."
         )
     else:
         yield "No sample lies so near a singular position that a reaction is undetermined for that reason."

@@ -5,8 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from crosscheck.setting import option_text
+
 from ..blocks import Block, Heading, Listing, Table, Text
-from ..runs import Curve, Run, SceneRuns, plain
+from ..runs import Curve, Run, SceneRuns
 from ..sections.records import path
 
 
@@ -64,7 +66,7 @@ def _settings(runs: Sequence[Run]) -> Table:
     values: dict[tuple[Curve, str], dict[str, None]] = {}
     for run in runs:
         for name, value in run.record["settings"].items():
-            values.setdefault((run.curve, name), {})[plain(value)] = None
+            values.setdefault((run.curve, name), {})[option_text(value)] = None
     rows = [(*curve, name, ", ".join(seen)) for (curve, name), seen in values.items()]
     return Table("Settings of every family.", ("Engine", "Family", "Option", "Values"), rows, folded=True)
 
