@@ -226,3 +226,8 @@ def listing(lines: Iterable[str], numbered: bool = False) -> list[Block]:
     """Return a list of lines in Markdown; empty without lines."""
     items = [f"{i}. {line}" if numbered else f"- {line}" for i, line in enumerate(lines, 1)]
     return [Prose("\n".join(items))] if items else []
+
+
+def anchor(name: str) -> str:
+    """Return the place of a folded row in a page, from its name."""
+    return "".join(c if c.isalnum() else "-" for c in name)

@@ -19,7 +19,7 @@ from crosscheck.conformance.mechanisms.random_scenes import floating, mechanism,
 from crosscheck.conformance.mechanisms.specimens import Specimen
 from crosscheck.conformance.properties import PROPERTIES
 from crosscheck.conformance.runners import InProcess
-from crosscheck.conformance.suite import CANNOT, FAIL, PASS, REFUSAL, RUN, Verdict
+from crosscheck.conformance.suite import CANNOT, FAIL, PASS, REFUSAL, RUN, Verdict, check_of
 from crosscheck.conformance.trial import Bench, Broken, difference, set_up
 from crosscheck.engine import engine
 from crosscheck.study.record_shape import OfSeed, checked
@@ -130,11 +130,6 @@ class Tally:
             "cards": checks,
             "violations": self.violations,
         }
-
-
-def check_of(name: str) -> str:
-    """Return the name of a check with its version."""
-    return Verdict(name, "", PASS).check()
 
 
 def about(name: str) -> str:

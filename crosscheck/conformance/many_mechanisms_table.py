@@ -8,8 +8,8 @@ from rich.box import SIMPLE
 from rich.table import Column, Table
 from rich.text import Text
 
-from crosscheck.conformance.many_mechanisms import Tally, about, check_of
-from crosscheck.conformance.suite import CANNOT, FAIL, OUTSIDE, PASS, RUN
+from crosscheck.conformance.many_mechanisms import Tally, about
+from crosscheck.conformance.suite import CANNOT, FAIL, OUTSIDE, PASS, RUN, check_of
 
 COLUMNS = (PASS, FAIL, CANNOT, OUTSIDE)
 

@@ -247,7 +247,7 @@ def tables(conformance: Conformance) -> Iterator[Table | Text]:
     yield table
     yield from (Text(sentence_of(v)) for v in conformance.verdicts if v.status in (CANNOT, EXPECTED))
     yield from _domains(conformance)
-    yield from (Text(f"{_check(name)}: {abouts()[name]}", style="dim") for name in properties)
+    yield from (Text(f"{check_of(name)}: {abouts()[name]}", style="dim") for name in properties)
     yield from (Text(sentence_of(verdict)) for verdict in conformance.verdicts if verdict.status == FAIL)
     if conformance.hint:
         yield Text(conformance.hint)
@@ -264,7 +264,8 @@ def _domains(conformance: Conformance) -> Iterator[Text]:
         yield Text(f"outside: {name}: {reason} ({', '.join(scenes)})", style="dim")
 
 
-def _check(name: str) -> str:
+def check_of(name: str) -> str:
+    """Return the name of a check with its version."""
     return Verdict(name, "", PASS).check()
 
 

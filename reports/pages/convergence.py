@@ -11,7 +11,7 @@ from crosscheck.convergence.orders import NEAR, cell, listed, table
 from crosscheck.study.grid import Record
 from crosscheck.study.store import read_runs
 
-from ..blocks import Fold, Parts, Table, Within, listing
+from ..blocks import Fold, Parts, Table, Within, anchor, listing
 
 
 def parts(records: Path = FILE) -> Parts:
@@ -19,7 +19,7 @@ def parts(records: Path = FILE) -> Parts:
     runs = read_runs(records)
     found, versions = table(runs), {r["engine"]: r["version"] for r in runs}
     header = ("engine, family", *(m.heading for m in MECHANISMS))
-    rows = [(Within(row.name, f"#{_place(row.name)}"), *map(cell, of.values())) for row, of in found.items()]
+    rows = [(Within(row.name, f"#{anchor(row.name)}"), *map(cell, of.values())) for row, of in found.items()]
     columns = (f"**{m.heading}** (`{m.place()}`, to {m.end:g} s): {m.about}" for m in MECHANISMS)
     return {
         "table": [Table("Least errors, and orders in parentheses.", header, rows)],
@@ -44,8 +44,4 @@ def _of_scenes() -> Fold:
 
 def _runs(row: Row, version: str, runs: Mapping[str, Sequence[Record]]) -> Fold:
     lines = listing(f"{name}: {listed(of_mechanism)}" for name, of_mechanism in runs.items())
-    return Fold(f"{row.name} {version}: {row.method}", _place(row.name), lines)
-
-
-def _place(name: str) -> str:
-    return "".join(c if c.isalnum() else "-" for c in name)
+    return Fold(f"{row.name} {version}: {row.method}", anchor(row.name), lines)

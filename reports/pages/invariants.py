@@ -9,7 +9,7 @@ from crosscheck.invariants.laws import COLUMNS, cell, listed, options, tables
 from crosscheck.invariants.records import FILE, Record, read
 from crosscheck.study.store import REFUSED
 
-from ..blocks import Block, Fold, Parts, Table, Within, listing
+from ..blocks import Block, Fold, Parts, Table, Within, anchor, listing
 
 
 def parts(records: Path = FILE) -> Parts:
@@ -26,7 +26,7 @@ def parts(records: Path = FILE) -> Parts:
 def _table(title: str, rows: Mapping[str, Sequence[Record]]) -> Table:
     header = ("engine, family", *(column.heading for column in COLUMNS))
     lines = [
-        (Within(name, f"#{_place(name)}"), *(cell(row, column) for column in COLUMNS))
+        (Within(name, f"#{anchor(name)}"), *(cell(row, column) for column in COLUMNS))
         for name, row in rows.items()
     ]
     return Table(f"{title[0].upper()}{title[1:]}.", header, lines)
@@ -38,9 +38,5 @@ def _runs(name: str, row: Sequence[Record]) -> Block:
     given = ", ".join(f"{k} {v}" for k, v in options(row).items())
     summary = f"{name} {row[0]['version']}: {families}" + f" ({given})" * bool(given)
     return Fold(
-        summary, _place(name), listing(f"{column.heading}: {listed(row, column)}" for column in COLUMNS)
+        summary, anchor(name), listing(f"{column.heading}: {listed(row, column)}" for column in COLUMNS)
     )
-
-
-def _place(name: str) -> str:
-    return "".join(c if c.isalnum() else "-" for c in name)
