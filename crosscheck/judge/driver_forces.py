@@ -12,9 +12,8 @@ import numpy as np
 from crosscheck.judge.constraints import jacobian, length_rows
 from crosscheck.judge.coupling_laws import unwound
 from crosscheck.judge.deadline import ask
-from crosscheck.judge.joint_coordinates import reflected
 from crosscheck.judge.joint_reactions import unit_rows
-from crosscheck.judge.reaction_balance import demanded
+from crosscheck.judge.reaction_balance import demanded, forces_of_armatures
 from crosscheck.judge.tolerances import RANK
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
@@ -44,15 +43,12 @@ def _multipliers(scene: Scene, exact: Trajectory, k: int, push: np.ndarray) -> n
     """Return the multipliers (rows,) at a sample, for the forces (6 nb,) that act on bodies without
     armatures."""
     ask()
-    assert exact.acceleration is not None
-    assert exact.angular_acceleration is not None
-    state = exact.position[k], exact.orientation[k], exact.velocity[k], exact.angular_velocity[k]
-    twist_rates = np.hstack([exact.acceleration[k], exact.angular_acceleration[k]]).ravel()
-    rotors = reflected(scene, *state)
-    rows = jacobian(scene, float(exact.times[k]), *state[:2])[0]
+    pose = exact.position[k], exact.orientation[k]
+    rows = jacobian(scene, float(exact.times[k]), *pose)[0]
     if np.isnan(rows).any():
         return np.full(len(rows), np.nan)
-    total = push + rotors.mass @ twist_rates - rotors.force
+    turned, strengths = forces_of_armatures(scene, exact, k)
+    total = push - turned.T @ strengths
     rows, units, sizes = unit_rows(scene, rows)
     u, s, vt = np.linalg.svd(rows, full_matrices=False)
     rank = int((s > RANK * s[0]).sum())

@@ -46,7 +46,7 @@ def with_exact_reactions(scene: Scene, exact: Trajectory) -> Trajectory:
                 wrenches[k] = np.nan
             continue
         scaled, units, sizes = unit_rows(scene, rows)
-        turned, strengths = _of_armatures(scene, exact, k)
+        turned, strengths = forces_of_armatures(scene, exact, k)
         pushed = units * (wanted[k].ravel() - turned.T @ strengths)
         pushes = np.linalg.lstsq(scaled.T, pushed, rcond=RANK)[0] / sizes
         for joint, wrenches in of_multipliers(own, rows, position, orientation):
@@ -57,7 +57,7 @@ def with_exact_reactions(scene: Scene, exact: Trajectory) -> Trajectory:
     return replace(exact, reactions=found)
 
 
-def _of_armatures(scene: Scene, exact: Trajectory, k: int) -> tuple[np.ndarray, np.ndarray]:
+def forces_of_armatures(scene: Scene, exact: Trajectory, k: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the rows (c, 6 nb) of coordinates q with an armature I at a sample, and their forces -I q''
     (c,)."""
     assert exact.acceleration is not None
