@@ -20,12 +20,12 @@ from crosscheck.engine import Setting
 from crosscheck.engines.mujoco.families import STIFFEST
 from crosscheck.engines.mujoco.importing.reading import Source, source
 from crosscheck.engines.mujoco.options import change, keyword
-from crosscheck.engines.mujoco.warnings_off import was_reset, without_warnings
+from crosscheck.engines.mujoco.warnings_off import check_state, without_warnings
 from crosscheck.engines.shared.fixed_steps import MOST_STEPS
-from crosscheck.engines.shared.sampling import Counts, Failed, Sample, run_through
+from crosscheck.engines.shared.sampling import Counts, Sample, run_through
 from crosscheck.setting import AS_IN_FILE
 from mbref.formats import ImportOptions, OriginalRun, add_options, import_options
-from mbref.motions.trajectory import Outcome, Trajectory
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 
 FINER, STIFFER, STIFFER_RK4 = "as in file, finer", "as in file, stiffer", "as in file, stiffer, RK4"
@@ -153,10 +153,7 @@ class _Original:
             mujoco.mj_step(model, self.between)
             model.opt.timestep = self.step
             self._count(1)
-        finite = np.isfinite(self.between.qpos).all() and np.isfinite(self.between.qvel).all()
-        if not finite or was_reset(mujoco, self.between):
-            message = f"the state became infinite or NaN between {t0:.6g} s and {t1:.6g} s"
-            raise Failed(Outcome.NOT_FINITE, t0, message)
+        check_state(mujoco, self.between, t0, t1)
 
     def _count(self, steps: int) -> None:
         rk4 = self.model.opt.integrator == self.mujoco.mjtIntegrator.mjINT_RK4

@@ -27,7 +27,7 @@ from crosscheck.engines.mujoco.families import (
 from crosscheck.engines.mujoco.model import compiled
 from crosscheck.engines.mujoco.options import change as change_options
 from crosscheck.engines.mujoco.projection import projected
-from crosscheck.engines.mujoco.warnings_off import was_reset, without_warnings
+from crosscheck.engines.mujoco.warnings_off import check_state, without_warnings
 from crosscheck.engines.shared.driver_motion import motion, stated_rate
 from crosscheck.engines.shared.sampling import Adaptive, Counts, Failed, Sample, step_count
 from crosscheck.engines.shared.tree_reactions import LinkMotion, joint_reactions, wrench
@@ -164,10 +164,7 @@ class Simulation:
         except self.mujoco.FatalError as error:
             raise Failed(Outcome.STEP_FAILED, t, f"MuJoCo stopped after {t:.6g} s: {error}") from error
         self.data.time = t1
-        finite = np.isfinite(self.data.qpos).all() and np.isfinite(self.data.qvel).all()
-        if not finite or was_reset(self.mujoco, self.data):
-            message = f"the state became infinite or NaN between {t0:.6g} s and {t1:.6g} s"
-            raise Failed(Outcome.NOT_FINITE, t0, message)
+        check_state(self.mujoco, self.data, t0, t1)
 
     def _fixed(self, t0: float, t1: float) -> None:
         n = step_count(t0, t1, self.nominal)
