@@ -61,6 +61,12 @@ def exit_status(motions: Mapping[str, Motion]) -> int:
     return 1 if ended else 0
 
 
+def open_combinations(found: Iterable[Mapping[str, float]]) -> list[str]:
+    """Return a line for each combination of numbers, by their weights, that data do not determine."""
+    sums = (" ".join(f"{weight:+.3g} ({name})" for name, weight in each.items()) for each in found)
+    return [f"not determined, in relative changes: {parts}" for parts in sums]
+
+
 def largest_numbers(columns: Mapping[str, np.ndarray], end: float) -> dict[str, float]:
     """Return the largest absolute number of each unit among columns (…) of a motion up to an end time (s).
 

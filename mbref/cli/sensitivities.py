@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbref.cli.output import console, warn
+from mbref.cli.output import console, open_combinations, warn
 from mbref.cli.request import add_scene, add_time_options, sample_times
 from mbref.command_line import add_output
 from mbref.input_error import InputError
@@ -123,9 +123,7 @@ def _fit(options: argparse.Namespace) -> int:
     lines = [
         f"{name} = {x:.9g}, standard error {found.errors[name]:.2g}" for name, x in found.numbers.items()
     ]
-    for combination in found.undetermined:
-        parts = " ".join(f"{weight:+.3g} ({name})" for name, weight in combination.items())
-        lines.append(f"not determined, in relative changes: {parts}")
+    lines += open_combinations(found.undetermined)
     lines += [f"root mean square residual of {name}: {x:.3g}" for name, x in found.deviations.items()]
     if found.left_out:
         lines.append(f"left out, without a derivative: {', '.join(found.left_out)}")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbref.cli.output import console, progress_bar, warn
+from mbref.cli.output import console, open_combinations, progress_bar, warn
 from mbref.cli.request import add_scene, add_time_options, sample_times
 from mbref.command_line import add_output, output_file, whole
 from mbref.files import replaced
@@ -146,9 +146,7 @@ def _show(found: SynthesisResult, least: bool) -> None:
     """Print the numbers, the residuals, and what else is known of the result."""
     lines = [f"{name} = {x:.12g}" for name, x in found.numbers.items()]
     lines += [f"at its {side} bound: {name}" for name, side in found.at_bounds.items()]
-    for combination in found.undetermined:
-        parts = " ".join(f"{weight:+.3g} ({name})" for name, weight in combination.items())
-        lines.append(f"not determined, in relative changes: {parts}")
+    lines += open_combinations(found.undetermined)
     console().print("\n".join(lines), soft_wrap=True)
     if not least:
         _show_points(found)
