@@ -98,15 +98,7 @@ def paper_mechanisms(draw: st.DrawFn, names: Sequence[str] = PAPER) -> Scene:
     for body in scene.body:
         mass, inertia = draw(factors), draw(factors)
         moments = (inertia * np.array(body.inertia)).tolist()
-        bodies.append(
-            Body(
-                **{
-                    **{n: getattr(body, n) for n in Body.model_fields},
-                    "mass": mass * cast(float, body.mass),
-                    "inertia": moments,
-                }
-            )
-        )
+        bodies.append(Body(**{**dict(body), "mass": mass * cast(float, body.mass), "inertia": moments}))
     return scene.with_(body=bodies)
 
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from mbref.scene.fields import meant
+from mbref.scene.fields import SceneEntry, meant
 from mbref.scene.validation import SceneError
 
 VECTOR_COMPONENTS = ("x", "y", "z")  # of a vector
@@ -75,9 +75,7 @@ def _later(time: Any, own: float, before: float) -> Any:
 def _fields_of(value: Any) -> Mapping[str, Any]:
     """Return the fields of an entry; an entry that was changed before is a dictionary, and a number has no
     fields."""
-    if isinstance(value, dict):
-        return value
-    return {field: getattr(value, field) for field in getattr(type(value), "model_fields", {})}
+    return dict(value) if isinstance(value, dict | SceneEntry) else {}
 
 
 def _place(entries: tuple[Any, ...], step: str, path: str) -> int:

@@ -182,7 +182,7 @@ class Scene(SceneEntry):
         SceneError
             If the path does not exist or the copy is no valid scene.
         """
-        data = {k: getattr(self, k) for k in type(self).model_fields}
+        data = dict(self)
         if path is not None:
             data = replaced_at(data, path, lambda _: value)
         return Scene(**{**data, **changes})

@@ -108,7 +108,7 @@ def variants(scene: Scene, variations: Sequence[Variation], count: int, seed: in
     """
     _refuse_repeated(scene, [variation.path for variation in variations])
     for k in range(count):
-        data = {field: getattr(scene, field) for field in Scene.model_fields}
+        data = dict(scene)
         random = np.random.default_rng([seed, k])
         for variation in variations:
             data = replaced_at(data, variation.path, partial(_drawn, variation, random))
@@ -117,7 +117,7 @@ def variants(scene: Scene, variations: Sequence[Variation], count: int, seed: in
 
 def _refuse_repeated(scene: Scene, paths: Sequence[str]) -> None:
     """Raise SceneError for two paths to one number; the last one alone would vary it."""
-    data, mark = {field: getattr(scene, field) for field in Scene.model_fields}, object()
+    data, mark = dict(scene), object()
     marked: list[tuple[str, dict[str, Any]]] = []
     for path in paths:
         found = replaced_at(data, path, lambda _: mark)

@@ -23,19 +23,14 @@ class Outside:
 def mapped(item: Item, fields: Mapping[str, Callable[[Any], Any]]) -> Item:
     """Return a validated copy of a body, joint, driver or load. Each named field that it has is replaced by
     the value of a function."""
-    given = fields_of(item)
+    given = dict(item)
     changed = {n: as_list(f(given[n])) for n, f in fields.items() if given.get(n) is not None}
     return type(item)(**{**given, **changed})
 
 
 def replaced(item: Item, **fields: Any) -> Item:
     """Return a validated copy with some fields replaced."""
-    return type(item)(**{**fields_of(item), **{name: as_list(value) for name, value in fields.items()}})
-
-
-def fields_of(item: SceneEntry) -> dict[str, Any]:
-    """Return the fields of a body, joint, driver or load as a dictionary."""
-    return {name: getattr(item, name) for name in type(item).model_fields}
+    return type(item)(**{**dict(item), **{name: as_list(value) for name, value in fields.items()}})
 
 
 def nudged(scene: Scene, rounding: float = ROUNDING) -> Scene:

@@ -50,13 +50,12 @@ def is_same_number(scene: Scene, path: str, other: str) -> bool:
     """Return whether two paths lead to one number of a scene; raises SceneError if one does not exist."""
     mark = object()
     found: list[Any] = []
-    fields = {field: getattr(scene, field) for field in Scene.model_fields}
-    replaced_at(replaced_at(fields, path, lambda _: mark), other, found.append)
+    replaced_at(replaced_at(dict(scene), path, lambda _: mark), other, found.append)
     return found[0] is mark
 
 
 def _at(scene: Scene, path: str) -> Any:
     """Return the entry or value of a scene at a path; raises SceneError if there is none."""
     found: list[Any] = []
-    replaced_at({field: getattr(scene, field) for field in Scene.model_fields}, path, found.append)
+    replaced_at(dict(scene), path, found.append)
     return found[0]
