@@ -85,18 +85,21 @@ def _grows(slopes: list[float]) -> str:
 
 def plot_growth(runs: dict[str, Run]) -> Drawing:
     """Return a plot of the violation over time, both logarithmic, with a curve for each tolerance."""
+    return _plot({f"rtol {name}": run for name, run in runs.items()}, 1, "log")
+
+
+def _plot(runs: dict[str, Run], first: int, scale: str) -> Drawing:
+    """Return a plot of the logarithm of the violation, from the ``first`` sample on, over time."""
     drawing, (axes,) = figures.canvas(7.2, 3.8)
     for i, (name, run) in enumerate(runs.items()):
-        t = np.array(run.record["times"])
-        look = i % len(figures.COLOURS)
         axes.plot(
-            t[1:],
-            violation(run)[1:],
-            label=f"rtol {name}",
-            color=figures.COLOURS[look],
+            run.record["times"][first:],
+            violation(run)[first:],
+            label=name,
+            color=figures.COLOURS[i % len(figures.COLOURS)],
             linestyle=figures.DASHES[i % len(figures.DASHES)],
         )
-    axes.set(xscale="log", yscale="log", xlabel="t (s)", ylabel="violation of positions")
+    axes.set(xscale=scale, yscale="log", xlabel="t (s)", ylabel="violation of positions")
     figures.legend_below(drawing, axes)
     return drawing
 
@@ -160,16 +163,4 @@ def _remedies(runs: dict[str, Run]) -> Table:
 
 def plot_violations(runs: dict[str, Run]) -> Drawing:
     """Return a plot of the violation over time, logarithmic, with a curve for each method."""
-    drawing, (axes,) = figures.canvas(7.2, 3.8)
-    for i, (name, run) in enumerate(runs.items()):
-        look = i % len(figures.COLOURS)
-        axes.plot(
-            run.record["times"],
-            violation(run),
-            label=name,
-            color=figures.COLOURS[look],
-            linestyle=figures.DASHES[i % len(figures.DASHES)],
-        )
-    axes.set(yscale="log", xlabel="t (s)", ylabel="violation of positions")
-    figures.legend_below(drawing, axes)
-    return drawing
+    return _plot(runs, 0, "linear")
