@@ -10,7 +10,7 @@ import re
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NoReturn
@@ -176,6 +176,17 @@ def record_file(text: str) -> str:
     """Return the path of a file to which records are added: the type of an option, with the faults of
     ``output_file``. Records that the file has already remain."""
     return output_file(text)
+
+
+def each_once(option: str, pairs: Iterable[tuple[Any, Any]]) -> dict[Any, Any]:
+    """Return the names and values of an option that may be repeated; raises InputError for a name that is
+    given twice, of whose values only the last one would count."""
+    found: dict[Any, Any] = {}
+    for name, value in pairs:
+        if name in found:
+            raise InputError(f"{option}: {name} is given twice; give it once")
+        found[name] = value
+    return found
 
 
 def whole(least: int, most: int) -> Callable[[str], int]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from mbref import files
+from mbref.command_line import each_once
 from mbref.input_error import InputError
 from mbref.scene import Scene, refuse_intervals, refuse_rolling
 
@@ -108,7 +109,7 @@ def add_options(parser: Any) -> None:
 def import_options(arguments: argparse.Namespace) -> ImportOptions:
     """Return the options that a command line gives."""
     kinds = [word.strip() for word in arguments.without.split(",") if word.strip()]
-    pose = dict(arguments.pose)
+    pose = each_once("--pose", arguments.pose)
     return ImportOptions(kinds, arguments.keyframe, pose, arguments.close, arguments.hold)
 
 

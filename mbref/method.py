@@ -245,6 +245,8 @@ def _part(text: str, table: Mapping[str, Part], kind: str, options: dict[str, di
     for position, item in enumerate(given):
         key, equals, value = item.partition("=")
         key, value = (key.strip(), value) if equals else (_positional(part, position), key)
+        if key in options.get(name, {}):
+            raise MethodError(f"{kind} {name}: option {key} is given twice; give it once")
         if key not in part.options:
             raise MethodError(f"{kind} {name} has no option {key!r}; it has: {_listed(part.options)}")
         try:

@@ -21,6 +21,7 @@ from crosscheck.recorded.exact import exact, reference_table, uncounted, write
 from crosscheck.recorded.judgement import Judgement, judge_motion
 from crosscheck.recorded.reading import read
 from crosscheck.recorded.search import SECONDS as SEARCHED
+from mbref.command_line import each_once
 
 SHOWN = 6  # number of headers that are printed of the columns that were not read
 
@@ -31,7 +32,7 @@ def judge(arguments: argparse.Namespace) -> int:
     Raises RequestError and SceneError.
     """
     (scene,) = scene_request.read_scenes([arguments.scene])
-    columns = dict(_assigned(text) for text in arguments.column)
+    columns = each_once("--column", map(_assigned, arguments.column))
     try:
         recording = read(Path(arguments.table), scene, columns, arguments.unit, arguments.quaternion)
     except OSError as error:

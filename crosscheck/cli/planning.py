@@ -15,6 +15,7 @@ from crosscheck.engine import Setting, engine
 from crosscheck.study.grid import MOST_SECONDS, Case, shown_name
 from crosscheck.study.search.offers import default_cases, of_file, scout, settings
 from crosscheck.study.search.selection import of_few_families
+from mbref.command_line import each_once
 from mbref.scene import Scene
 from mbref.scene.fields import meant
 
@@ -46,7 +47,7 @@ def choice(
         return Choice(families or None, None, rtol, is_quick)
     if len(engines) != 1 or len(families) != 1:
         raise RequestError("--option: needs one --engine and one --setting to which the option belongs")
-    return Choice(families, Setting(families[0], dict(options)), rtol, is_quick)
+    return Choice(families, Setting(families[0], each_once("--option", options)), rtol, is_quick)
 
 
 def plan(

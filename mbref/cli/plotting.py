@@ -10,7 +10,7 @@ from mbref.cli.motors import add_motors, motion_by
 from mbref.cli.output import exit_status
 from mbref.cli.pictures import path_of
 from mbref.cli.request import Request, add_method_options, add_scene, add_units, request_of
-from mbref.command_line import add_output
+from mbref.command_line import add_output, each_once
 from mbref.files import replaced
 from mbref.input_error import InputError
 from mbref.motions.drawing.plot import plot
@@ -67,15 +67,16 @@ def add(commands: Any) -> None:
 
 
 def _values(words: Sequence[str]) -> dict[str, list[float]]:
-    """Return the values of ``--vary`` by option; raises InputError for a word without numbers."""
-    found = {}
+    """Return the values of ``--vary`` by option; raises InputError for a word without numbers, or an option
+    that is given twice."""
+    found = []
     for word in words:
         name, _, numbers = word.partition("=")
         try:
-            found[name] = [float(number) for number in numbers.split(",")]
+            found.append((name, [float(number) for number in numbers.split(",")]))
         except ValueError:
             raise InputError(f"--vary: must be OPTION=NUMBER,…, such as alpha=1,5,25, got {word!r}") from None
-    return found
+    return each_once("--vary", found)
 
 
 def _motions(options: argparse.Namespace, run: Request, names: Sequence[str]) -> dict[str, Motion]:

@@ -13,7 +13,7 @@ import numpy as np
 from mbref.cli.motors import add_motors, motion_by
 from mbref.cli.output import STATE, body_table, column_tables, console, largest_numbers, progress_bar, rounded
 from mbref.cli.request import add_method_options, add_scene, add_units, request_of
-from mbref.command_line import add_output
+from mbref.command_line import add_output, each_once
 from mbref.input_error import InputError
 from mbref.motions.motion import Motion
 from mbref.motions.output_units import requested_units, unit_of_column
@@ -122,12 +122,12 @@ def _estimated(motion: Motion, wanted: str) -> Motion:
 
 def _branches(words: list[str]) -> dict[int, int]:
     """Return the branch for each crossing; raises InputError for a word that is not of the form
-    ``CROSSING=BRANCH``."""
+    ``CROSSING=BRANCH``, or a crossing that is given twice."""
     try:
-        pairs = [word.split("=") for word in words]
-        return {int(crossing): int(branch) for crossing, branch in pairs}
+        pairs = [(int(crossing), int(branch)) for crossing, branch in (word.split("=") for word in words)]
     except ValueError:
         raise InputError(f"--branch: must be CROSSING=BRANCH, such as 2=2, got {' '.join(words)!r}") from None
+    return each_once("--branch", pairs)
 
 
 def _writer(out: str | None) -> Any:

@@ -104,6 +104,7 @@ def test_branches_that_are_not_positive_whole_numbers_are_refused(wrong):
         ("0.5 --branch 2=3", "--branch: the motion passes 1 singular position up to t = 0.5 s, and no"),
         ("0.5 --branch 1=3", "--branch: the crossing at t = 0.162337 s has no branch 3: 2 branches"),
         ("0.5 --branch 1=2 --method lm1", "--branch: lm1"),
+        ("0.5 --branch 1=1 --branch 1=2", "--branch: 1 is given twice; give it once"),
         ("0.5 --code generated --method lm1", "--code: lm1"),
     ],
 )

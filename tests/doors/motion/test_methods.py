@@ -7,6 +7,7 @@ import pytest
 
 import mbref
 from crosscheck.judge.metrics import violation_series
+from mbref.cli import main
 from mbref.formulations import FORMULATIONS
 from mbref.motions.trajectory import Outcome
 from mbref.stabilisation import STABILISATIONS
@@ -164,6 +165,12 @@ def test_sweep_has_a_motion_for_values_that_are_equal_to_six_digits():
     """Labels of motions have as many digits as their values need."""
     found = mbref.sweep("point_pendulum", "lm1+none/rk4", {"step": [0.01, 0.0100000001]}, [0.01])
     assert list(found) == ["step = 0.01", "step = 0.0100000001"]
+
+
+def test_option_that_is_varied_twice_is_refused(capsys):
+    """Of two lists of values for one option the last one alone would be drawn."""
+    assert main(["plot", "four_bar", "--method", "lm1+baumgarte", *("--vary", "alpha=5") * 2]) == 2
+    assert capsys.readouterr().err == "--vary: alpha is given twice; give it once\n"
 
 
 def test_option_of_two_parts_of_a_method_is_varied_by_the_name_of_its_part():

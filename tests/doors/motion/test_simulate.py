@@ -123,6 +123,7 @@ def test_run_ends_as_failed_after_the_largest_number_of_steps():
         ("lm9+none", "unknown formulation 'lm9'; known: lm1"),
         ("lm1+glue", "unknown stabilisation 'glue'; known: none, baumgarte"),
         ("lm1+none/euler", "unknown integrator 'euler'; known: dop853"),
+        ("lm1+baumgarte[5,alpha=7]", "stabilisation baumgarte: option alpha is given twice; give it once"),
         ("lm1+baumgarte[gamma=5]", "has no option 'gamma'; it has: alpha, beta"),
         ("lm1+baumgarte[alpha=x]", "must be a number"),
     ],
