@@ -31,6 +31,8 @@ from mbref.taylor.stepping import advance_series, enter_series
 
 # expected steps above which generated code saves more time than its generation takes
 STEPS_WORTH_CODE = 20_000
+AT_END = 1e-6  # distance of a singular position from the end of a run / end, below which it is at the end
+BEYOND = 0.05  # share of the time by which such a run goes beyond its end
 
 
 class SeriesStepper:
@@ -118,6 +120,37 @@ class SeriesStepper:
 
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
         """Run to the end; return the final status and the process CPU time of the stepping alone (s)."""
+        status, seconds = self._advance(progress)
+        if status == UNDECIDED and self._ends_at_position:
+            status, more = self._cross_at_end(progress)
+            seconds += more
+        return status, seconds
+
+    @property
+    def _ends_at_position(self) -> bool:
+        """Return whether the run ends at the singular position ahead, or shortly before it."""
+        clock, end = self.run.memory.loop.clock, self.run.times[-1]
+        return bool(self.ahead and abs(clock.time + self.ahead - end) <= AT_END * end)
+
+    def _cross_at_end(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
+        """Run again to an end beyond the singular position at the end; return status and time as ``advance``.
+
+        No step is short enough to end next to a singular position, but a step across it has the samples
+        before it.
+        """
+        run, clock, end = self.run, self.run.memory.loop.clock, float(self.run.times[-1])
+        run.begin_again()
+        self.begin_again()
+        run.crossings, self.taylor.progress.end = [], (1 + BEYOND) * end
+        status, seconds = self._advance(progress)
+        if clock.sample < len(run.times):
+            return status, seconds
+        run.crossings = [passed for passed in run.crossings if passed.time <= end]
+        run.memory.equations.system.counts.crossings, clock.time = len(run.crossings), end
+        return DONE, seconds
+
+    def _advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
+        """Run to the end of the memory once, as ``advance``."""
         making, began = self.run.making, time.process_time()
         status = self._branches.leave_start()
         if self._branches.begins_at_branches:
@@ -153,7 +186,6 @@ class SeriesStepper:
 
     def expand(self) -> int:
         """Expand at the present time and state, for steps until the end; return OK or the failure status."""
-        self.taylor.progress.end = self.run.times[-1]
         return int(enter_series(self.argument))
 
     def _begin_again(self, status: int) -> int:

@@ -114,12 +114,19 @@ def test_message_of_an_undecided_run_also_states_the_branch_at_its_start():
     assert "takes, of the 2 branches that meet there, the branch of Gauss's principle" in start
 
 
-def test_message_of_an_undecided_run_states_the_time_of_the_singular_position_ahead():
-    """Crank and rod of equal length, at 2π rad/s, stand upright at 0.25 s. The run ends 10 ns before."""
+@pytest.mark.parametrize("before", [1e-8, 1e-10, 0.0])
+def test_run_that_ends_at_a_singular_position_has_the_samples_of_a_run_that_goes_on(before: float):
+    """Crank and rod of equal length L, at 2π rad/s, stand upright at 0.25 s: the slider is at 2 L cos 2πt.
+    The run ends there, or some ns before, where no position is passed yet."""
     driver = [{"joint": "A", "polynomial": (0.0, 2 * np.pi)}]
     scene = find_scene("planar_slider_crank_equal").with_(driver=driver, load=[])
-    run = simulate(scene, "taylor", [0.25 - 1e-8])
-    assert run.outcome.name == "UNDECIDED" and "a singular position at t = 0.25 s" in run.message
+    times = np.array([0.1, 0.25 - before])
+    run, further = (simulate(scene, "taylor", [*times, *more]) for more in ([], [0.28]))
+    start = scene.body[scene.body_index("slider")].position[0]
+    assert run.outcome.name == "COMPLETED" and run.t_end == times[-1]
+    assert run["slider"].position[:, 0] == pytest.approx(start * np.cos(2 * np.pi * times), abs=1e-9)
+    assert run["slider"].velocity == pytest.approx(further["slider"].velocity[:2], abs=1e-9)
+    assert len(run.crossings) == (not before) == ("passed: 1" in run.message)
 
 
 def test_branches_of_a_start_at_rest_are_listed_without_velocities():
