@@ -106,11 +106,13 @@ def _poses(
 
 
 def plot_poses(scene: Scene, runs: Named, span: tuple[float, float] | None) -> str:
-    """Return poses of the links side by side as SVG, one panel for each method, within a span of time (s)."""
+    """Return poses of the links side by side as SVG, one panel for each method, within a span of time (s); a
+    run that ended before it shows its last pose."""
     shown = {}
     for name, run in runs.items():
-        low, high = span or (0.0, run.trajectory.times[-1])
-        first, end = np.searchsorted(run.trajectory.times, [low, np.nextafter(high, np.inf)])
+        times = run.trajectory.times
+        low, high = span or (0.0, times[-1])
+        first, end = np.searchsorted(times, [min(low, times[-1]), np.nextafter(high, np.inf)])
         motion = mechanisms.sample(run.trajectory, slice(int(first), int(end)))
         shown[name] = f"to {motion.times[-1]:.4g} s", motion
     return mechanisms.poses_side_by_side(scene, shown, POSES)
