@@ -2,7 +2,6 @@
 
 import contextlib
 import signal
-import threading
 from collections.abc import Iterator
 
 import pytest
@@ -30,15 +29,6 @@ def test_interrupt_of_a_compilation_is_raised_at_once_or_if_it_is_lost_at_the_en
     assert done == ["compiled"] * len(lost) and signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_error_of_a_compilation_is_raised_instead_of_a_lost_interrupt():
-    """An interrupt is suppressed, and then a division by zero ends the compilation."""
-    with pytest.raises(ZeroDivisionError), interrupts_kept():
-        with contextlib.suppress(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGINT)
-        _ = 1 / 0
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-
-
 def test_handler_that_the_program_installed_receives_the_interrupt():
     """The handler notes the number of the signal and raises nothing."""
     received = []
@@ -46,17 +36,3 @@ def test_handler_that_the_program_installed_receives_the_interrupt():
     with interrupts_kept():
         signal.raise_signal(signal.SIGINT)
     assert received == [signal.SIGINT]
-
-
-def test_handler_is_not_replaced_in_another_thread():
-    """Python allows signal handlers to be set in the main thread only."""
-    seen = []
-
-    def compiled() -> None:
-        with interrupts_kept():
-            seen.append(signal.getsignal(signal.SIGINT))
-
-    thread = threading.Thread(target=compiled)
-    thread.start()
-    thread.join()
-    assert seen == [signal.default_int_handler]
