@@ -53,6 +53,7 @@ class Text:
                 model.body_mass[b] = max(model.body_mass[b] - mass, 0.0)
                 left = model.body_inertia[b] - moment
                 model.body_inertia[b] = np.where(left > LEAST * moment, left, 0.0)  # the rest is rounding
+        _correct_diagonal(mujoco, model)
         model.body_subtreemass[:] = model.body_mass
         for b in range(model.nbody - 1, 0, -1):
             model.body_subtreemass[model.body_parentid[b]] += model.body_subtreemass[b]
@@ -79,6 +80,20 @@ def prepared(text: str | bytes, hold: Sequence[str] = (), where: str = "URDF") -
     options.attrib.update(fusestatic="false", discardvisual="true", balanceinertia="false")
     moved = {name: more for name, more in added.items() if more != (0.0, 0.0)}
     return Text(ET.tostring(root, encoding="unicode"), moved, whole)
+
+
+def _correct_diagonal(mujoco: Any, model: Any) -> None:
+    """Compute the entries of the mass matrix that MuJoCo stores: of bodies on the world without children,
+    whose part of the matrix is diagonal."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    for v in np.flatnonzero(model.dof_simplenum):
+        b, moves, turns = int(model.dof_bodyid[v]), np.zeros((3, model.nv)), np.zeros((3, model.nv))
+        mujoco.mj_jacBodyCom(model, data, moves, turns, b)
+        spin = data.ximat[b].reshape(3, 3).T @ turns[:, v]
+        inertia = model.body_mass[b] * moves[:, v] @ moves[:, v] + model.body_inertia[b] @ spin**2
+        model.dof_M0[v] = inertia + model.dof_armature[v]
 
 
 def _name_base_of_floating_joints(root: ET.Element) -> None:
