@@ -154,7 +154,11 @@ class Compiled(Loaded):
                 points = (at[0:3], at[3:6]) if kind == kinds.mjEQ_CONNECT else (at[3:6], at[0:3])
                 bodies = self.body(first), self.body(second)
                 ends = self._point(first, points[0]), self._point(second, points[1])
-            yield Loop(str(m.equality(e).name) or f"equality {e}", names[kind], bodies, ends)
+            is_turning = (
+                kind == kinds.mjEQ_WELD and not m.eq_data[e, 10]
+            )  # torquescale 0 leaves rotations free
+            what = "spherical" if is_turning else names[kind]
+            yield Loop(str(m.equality(e).name) or f"equality {e}", what, bodies, ends)
 
     def _point(self, body: int, local: np.ndarray) -> Vector:
         return vector(self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ local)
@@ -264,7 +268,10 @@ class Compiled(Loaded):
 
 
 def obey(mujoco: Any, model: Any) -> None:
-    """Set the springs, dampers and dry friction of joints to zero that the file's flags disable."""
+    """Set the springs, dampers and dry friction of joints to zero that the file's flags disable, and springs
+    that yield, which are not compared."""
+    plastic = np.flatnonzero(getattr(model, "jnt_springyield", ()))  # older versions have none
+    model.jnt_stiffness[plastic] = model.jnt_stiffnesspoly[plastic] = 0.0
     off, bits = model.opt.disableflags, mujoco.mjtDisableBit
     for flag, numbers in (
         (bits.mjDSBL_SPRING, (model.jnt_stiffness, model.jnt_stiffnesspoly)),

@@ -107,11 +107,7 @@ def test_wheel_on_a_spring_and_a_servo_swings_about_their_common_natural_angle(f
     [
         ("position joint='JOINT' kp='5' forcerange='-1 1'", "", "actuator 0, whose range of forces"),
         ("muscle name='m' joint='JOINT' lengthrange='0 1'", "ctrl='1'", "'m', whose force is not linear"),
-        (
-            "dcmotor name='s' joint='JOINT' motorconst='1' resistance='2'",
-            "",
-            "'s', whose force is not linear",
-        ),
+        ("dcmotor name='s' joint='JOINT' motorconst='1' resistance='2'", "", "'s', whose force is not"),
         ("position name='s' joint='JOINT' kp='5' timeconst='.1'", "ctrl='1'", "'s', whose input changes"),
         ("position name='s' joint='JOINT' kp='-5'", "", "'s', whose stiffness or damping is negative"),
         ("motor name='s' site='there' gear='0 0 1 0 0 0'", "ctrl='1'", "'s', which acts on no single hinge"),

@@ -166,11 +166,7 @@ FAULTS = [  # text of `pair`, the text in its place, the error's words
         "<include merge='1'><uri>x</uri></include></model>",
         "include 'x': merge='true' is not read",
     ),
-    (
-        "</model>",
-        "<include><uri>x</uri><experimental:params/></include></model>",
-        "include 'x': experimental:params is not read",
-    ),
+    ("</model>", "<include><uri>x</uri><x:params/></include></model>", "'x': experimental:params"),
     (A_TO_B, "<child>b</child>", "joint 'B': names no parent"),
     (A_TO_B, A_TO_B.replace(">b<", ">a<"), "joint 'B': both sides are on link 'a'"),
     ("<mass>0.5<", "<mass>0<", "link 'a': mass must be positive, got 0"),
