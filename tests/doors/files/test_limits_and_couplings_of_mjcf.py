@@ -53,12 +53,8 @@ def test_a_switch_of_a_file_turns_off_springs_or_dampers_of_tendons(files, flag,
 
 def test_a_tendon_spring_between_sites_of_one_body_is_left_out_with_a_note(files):
     """Its forces on the body cancel."""
-    text = LIMITED.format(joint="", tendon="stiffness='2'").replace(
-        "<site site='hook'/>", "<site site='nose'/>"
-    )
-    text = text.replace('site="hook"', 'site="nose"').replace(
-        "</body>", "<site name='nose' pos='1 0 0'/></body>"
-    )
+    text = LIMITED.format(joint="", tendon="stiffness='2'").replace('site="hook"', 'site="nose"')
+    text = text.replace("</body>", "<site name='nose' pos='1 0 0'/></body>")
     scene, out = files.scene(text, "a.xml")
     assert not scene.load and "tendon 'rope': both sites are on 'bob'" in out
 
