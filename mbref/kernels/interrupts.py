@@ -11,7 +11,8 @@ from types import FrameType
 
 @contextlib.contextmanager
 def interrupts_kept() -> Iterator[None]:
-    """Raise KeyboardInterrupt at the end of the ``with`` block if an interrupt within it was lost.
+    """Raise KeyboardInterrupt at the end of the ``with`` block if an interrupt within it was lost, also in
+    place of an error that follows.
 
     LLVM calls Python functions while it compiles, and an exception in such a function is lost. Other threads
     and programs with a handler of their own are left alone.
@@ -29,6 +30,10 @@ def interrupts_kept() -> Iterator[None]:
     signal.signal(signal.SIGINT, receive)
     try:
         yield
+    except Exception as error:
+        if received:  # LLVM did not finish what the interrupt ended
+            raise KeyboardInterrupt from error
+        raise
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if received:

@@ -29,6 +29,14 @@ def test_interrupt_of_a_compilation_is_raised_at_once_or_if_it_is_lost_at_the_en
     assert done == ["compiled"] * len(lost) and signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+def test_error_that_follows_a_lost_interrupt_is_an_interrupt():
+    """A compilation whose callback was interrupted has no machine code, which is an error of numba's."""
+    with pytest.raises(KeyboardInterrupt), interrupts_kept():
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        raise RuntimeError("no compiled object")
+
+
 def test_handler_that_the_program_installed_receives_the_interrupt():
     """The handler notes the number of the signal and raises nothing."""
     received = []
