@@ -20,6 +20,7 @@ from crosscheck.derivatives.mechanisms import MECHANISMS
 from crosscheck.differentiating import Differentiating
 from crosscheck.engine import all_engines, engine, engine_names
 from crosscheck.processes.child import ChildFailed
+from mbref.records import finite
 from mbref.scene import Scene
 
 Refusals = list[dict[str, str]]
@@ -130,7 +131,8 @@ def _print(arguments: argparse.Namespace, found: Sequence[compare.Row], refused:
 
 
 def _record(row: compare.Row) -> dict[str, object]:
-    return {**vars(row), "grade": row.grade}
+    """Return the fields of a row; infinite numbers, of derivatives that are not finite, as None."""
+    return {**finite(vars(row)), "grade": row.grade}
 
 
 def _show(found: Sequence[compare.Row], refused: Refusals) -> None:

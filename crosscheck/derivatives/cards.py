@@ -64,7 +64,10 @@ class Subject:
 
 
 def _relative(off: np.ndarray, scale: float) -> float:
-    return float(np.abs(off).max(initial=0.0)) / max(scale, float(np.finfo(float).tiny))
+    """Return the largest error over a scale, infinite for NaN, which ``max`` of several errors would leave
+    out."""
+    found = np.abs(off) / max(scale, float(np.finfo(float).tiny))
+    return float(compare.finite_or_infinite(found).max(initial=0.0))
 
 
 def _neighbours(subject: Subject, scene: Scene) -> Iterator[tuple[Callable[[float], State], np.ndarray]]:

@@ -44,7 +44,8 @@ STILL = {"velocity": None, "angular_velocity": None}
 @dataclass(frozen=True)
 class Row:
     """The error of one block of derivatives, by an engine's function at a state, relative to the block's
-    largest entry, or to what moves a body by its displacement in the scene's duration.
+    largest entry, or to what moves a body by its displacement in the scene's duration; infinite where a
+    derivative is not finite.
 
     ``worst`` is the coordinate, or the component of a body's acceleration, that is most off. ``uncertain`` is
     the error of the truth, too large where the engine's accelerations have a kink.
@@ -64,7 +65,7 @@ class Row:
     @property
     def grade(self) -> str:
         """Return ``right``, ``rough``, ``wrong``, or ``undecided`` where the truth is too uncertain."""
-        found = next(name for name, most in MOST.items() if not self.error > most)
+        found = next((name for name, most in MOST.items() if self.error <= most), WRONG)
         return UNDECIDED if found != RIGHT and self.error <= SAFETY * self.uncertain else found
 
 
@@ -185,7 +186,8 @@ def _by_differences(found: OwnDerivatives, source: Source, scene: Scene) -> Iter
         if own is None:
             continue
         many = [slopes(function, step * units) / step for step in (*steps, steps[-1] / FINER)]
-        apart = [float(np.abs(a - b).max(initial=0.0)) for a, b in itertools.pairwise(many)]
+        changes = [finite_or_infinite(np.abs(a - b)) for a, b in itertools.pairwise(many)]
+        apart = [float(change.max(initial=0.0)) for change in changes]
         best = int(np.argmin(apart))
         least = {POSITION: size, VELOCITY: size**0.5}.get(name, 0.0)
         error, worst, scale = _error(
@@ -285,11 +287,17 @@ def _sizes(found: OwnDerivatives, scene: Scene) -> np.ndarray:
 def _error(
     own: np.ndarray, true: np.ndarray, named: tuple[str, ...], least: float
 ) -> tuple[float, str, float]:
-    """Return the largest difference of rows / a scale, the largest true entry or ``least``; the row's name;
-    and the scale."""
-    off = np.abs(own - true).max(axis=1, initial=0.0)
-    scale = max(float(np.abs(true).max(initial=0.0)), least, np.finfo(float).tiny)
+    """Return the largest difference of rows / a scale, the largest true entry or ``least``, infinite where an
+    entry is not finite; the row's name; and the scale."""
+    off = finite_or_infinite(np.abs(own - true)).max(axis=1, initial=0.0)
+    largest = float(np.abs(true).max(initial=0.0, where=np.isfinite(true)))
+    scale = max(largest, least, np.finfo(float).tiny)
     return float(off.max(initial=0.0)) / scale, named[int(off.argmax())], scale
+
+
+def finite_or_infinite(sizes: np.ndarray) -> np.ndarray:
+    """Return sizes of errors with infinity in place of NaN, which no comparison finds large."""
+    return np.where(np.isnan(sizes), np.inf, sizes)
 
 
 def _components(scene: Scene) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ columns, the rows that are solved, or the result."""
 
 import functools
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -33,13 +34,14 @@ TERMS = (FORCES, ROWS, RATES, STABILISATION, INERTIA, GYROSCOPIC)
 
 class Fault(NamedTuple):
     """Factors on the changes of terms, and on columns of rotations; whether multipliers are kept, whether
-    forces act on free bodies, and whether the matrix by positions is transposed."""
+    forces act on free bodies, and whether the matrix by positions is transposed; the matrix that is NaN."""
 
     factors: Mapping[str, float] = {}
     turning: float = 1.0
     keeps_multipliers: bool = False
     frees_bodies: bool = False
     transposes: bool = False
+    nan: str = ""
 
 
 FAULTS = {
@@ -57,6 +59,8 @@ FAULTS = {
     "QUATERNION": Fault(turning=0.5),
     "FREE_BODIES": Fault(frees_bodies=True),
     "TRANSPOSED": Fault(transposes=True),
+    "NAN": Fault(nan="by_velocity"),
+    "NAN_BY_FORCE": Fault(nan="by_force"),
 }
 
 
@@ -105,7 +109,7 @@ class Faulty(Differentiating, Engine):
         by_force = np.array([_solved(matrix, 0 * sum(rest.values()), e)[0] for e in unit]).T
         if fault.frees_bodies:
             by_force = np.linalg.inv(matrix[: len(v), : len(v)])
-        return OwnDerivatives(
+        found = OwnDerivatives(
             coordinates=tuple(f"{body.name}[{k}]" for body in scene.body for k in range(6)),
             velocity=v,
             acceleration=a,
@@ -116,6 +120,7 @@ class Faulty(Differentiating, Engine):
             opening=lambda step, rate: jacobian(scene, 0.0, *_pose(scene, at + step))[0] @ rate,
             own=lambda step, rate, force: _accelerations(scene, at + step, rate, force),
         )
+        return replace(found, **{fault.nan: np.nan * found.by_position}) if fault.nan else found
 
 
 def _pose(scene: Scene, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -188,4 +193,4 @@ def _accelerations(scene: Scene, step: np.ndarray, v: np.ndarray, force: np.ndar
 
 
 ENGINES = {name: Faulty(name) for name in FAULTS}
-NONE, VELOCITY_SIGN = ENGINES["NONE"], ENGINES["VELOCITY_SIGN"]
+NONE, VELOCITY_SIGN, NAN = (ENGINES[name] for name in ("NONE", "VELOCITY_SIGN", "NAN"))

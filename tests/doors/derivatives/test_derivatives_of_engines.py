@@ -31,6 +31,8 @@ FOUND = {  # engine of the zoo: words of the sentence on the cause
     "QUATERNION": RESTS,
     "FREE_BODIES": RESTS,
     "TRANSPOSED": RESTS,
+    "NAN": RESTS,
+    "NAN_BY_FORCE": RESTS,
 }
 WHIRLING = {"CONSTANT_INERTIA": RESTS, "NO_GYROSCOPIC": MOVES}  # shown by a body with turning principal axes
 
@@ -79,13 +81,22 @@ def test_each_faulty_gradient_fails_a_card_and_a_right_one_passes_all_cards(name
 
 @pytest.mark.parametrize(
     ("card", "fault"),
-    [("closures", "VELOCITY_SIGN"), ("energy", "FORCE_SIGN"), ("virtual work", "NO_GYROSCOPIC")],
+    [
+        *(("closures", "VELOCITY_SIGN"), ("energy", "FORCE_SIGN"), ("virtual work", "NO_GYROSCOPIC")),
+        *(("order", "NAN"), ("closures", "NAN_BY_FORCE")),
+    ],
 )
 def test_cards_find_faults_of_a_body_on_a_link_without_the_judges_derivatives(card, fault):
     """NONE, without fault, satisfies an identity to rounding; a fault violates it by more than 1e-3."""
     scene = SPATIAL[0].make()
     right, wrong = (CARDS[card].check(Subject(ENGINES[name], "own"), scene) for name in ("NONE", fault))
     assert right <= 1e-11 and wrong > 1e-3
+
+
+def test_derivative_that_is_no_number_is_graded_as_wrong():
+    """NaN is neither above nor below a limit."""
+    names = dict.fromkeys(("engine", "version", "function", "scene", "state", "truth", "by", "worst"), "")
+    assert compare.Row(**names, error=float("nan")).grade == "wrong"
 
 
 @pytest.mark.slow
@@ -106,7 +117,7 @@ def test_card_that_has_nothing_to_compare_gives_a_reason_in_place_of_a_pass():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "words"), [("NONE", ""), ("VELOCITY_SIGN", MOVES)])
+@pytest.mark.parametrize(("name", "words"), [("NONE", ""), ("VELOCITY_SIGN", MOVES), ("NAN", RESTS)])
 def test_command_fails_if_a_derivative_is_wrong_and_says_on_what_it_depends(loop, name, words, capsys):
     """NONE is right. VELOCITY_SIGN has the wrong sign of J̇ v, which is zero at rest: status 1."""
     assert main(["derivatives", f"{ZOO}:{name}", loop]) == bool(words)
