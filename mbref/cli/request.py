@@ -154,9 +154,8 @@ def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:
         raise InputError(f"--times: must be finite, not negative and increasing, got {options.times}")
     if times[-1] > MOST_DURATION:
         raise InputError(f"--times: must be at most {MOST_DURATION:g} s, got {times[-1]:g}")
-    times = times if options.duration is None else times[times <= duration]
-    if not times.size:
-        raise InputError(f"--times: none is within --duration {duration:g}")
+    if options.duration is not None and times[-1] > duration:
+        raise InputError(f"--times: must end by --duration {duration:g}, got {times[-1]:g}")
     return times
 
 

@@ -98,7 +98,7 @@ def test_sample_time_beyond_the_largest_or_not_increasing_is_refused_by_option(c
         (["--times=0,nan"], "must be finite, not negative and increasing, got 0,nan"),
         (["--times=-1,0"], "must be finite, not negative and increasing, got -1,0"),
         (["--times=1,x"], "must be numbers separated by commas, got '1,x'"),
-        (["--times=1", "--duration=0.5"], "none is within --duration 0.5"),
+        (["--times=1", "--duration=0.5"], "must end by --duration 0.5, got 1"),
     ],
 )
 def test_times_of_mbref_that_are_no_samples_are_refused_with_the_option(words: list[str], says: str, capsys):
