@@ -19,7 +19,7 @@ from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 from tests.helpers.geared_arms import arms
 from tests.helpers.intermittent_mechanisms import carts
-from tests.helpers.parts import hinge
+from tests.helpers.parts import hinge, slide
 from tests.reports import synthetic
 
 TIMES = np.array([0.0, 1.0])
@@ -79,13 +79,7 @@ def test_rack_whose_pinion_turns_too_far_between_samples_has_no_known_gap():
     scene = arms(1.0).with_(
         joint=[
             hinge("pin", "ground", "a", (0.0, 0.0, 0.0)),
-            {
-                "name": "rail",
-                "type": "translational",
-                "bodies": ["ground", "b"],
-                "anchor": [0.0] * 3,
-                "axis": [1.0, 0.0, 0.0],
-            },
+            slide("rail", "ground", "b", (0.0, 0.0, 0.0)),
         ],
         coupling=[{"name": "teeth", "joints": ["pin", "rail"], "ratio": 0.1}],
         load=[{"type": "moment", "body": "a", "moment": [0.0, 0.0, 400.0]}],

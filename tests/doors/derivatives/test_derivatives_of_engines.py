@@ -93,12 +93,6 @@ def test_cards_find_faults_of_a_body_on_a_link_without_the_judges_derivatives(ca
     assert right <= 1e-11 and wrong > 1e-3
 
 
-def test_derivative_that_is_no_number_is_graded_as_wrong():
-    """NaN is neither above nor below a limit."""
-    names = dict.fromkeys(("engine", "version", "function", "scene", "state", "truth", "by", "worst"), "")
-    assert compare.Row(**names, error=float("nan")).grade == "wrong"
-
-
 @pytest.mark.slow
 def test_command_prints_the_cards_that_an_engine_passes(capsys):
     """mbref passes all; "differences" is not asked, as it has no accelerations off the constraints."""
