@@ -32,7 +32,7 @@ from mbref.taylor.stepping import advance_series, enter_series
 # expected steps above which generated code saves more time than its generation takes
 STEPS_WORTH_CODE = 20_000
 AT_END = 1e-6  # distance of a singular position from the end of a run / end, below which it is at the end
-BEYOND = 0.05  # share of the time by which such a run goes beyond its end
+PAST_END = 0.05  # share of the time by which such a run goes beyond its end
 
 
 class SeriesStepper:
@@ -141,7 +141,7 @@ class SeriesStepper:
         run, clock, end = self.run, self.run.memory.loop.clock, float(self.run.times[-1])
         run.begin_again()
         self.begin_again()
-        run.crossings, self.taylor.progress.end = [], (1 + BEYOND) * end
+        run.crossings, self.taylor.progress.end = [], (1 + PAST_END) * end
         status, seconds = self._advance(progress)
         if clock.sample < len(run.times):
             return status, seconds
