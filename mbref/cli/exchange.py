@@ -50,6 +50,8 @@ def add(commands: Any) -> None:
 
 
 def _import(options: argparse.Namespace) -> int:
+    if not Path(options.file).name:
+        raise InputError(f"FILE: must be a file, got {options.file!r}")
     out = free(options.out or Path(options.file).with_suffix(".toml"), options.force)
     if out.suffix != ".toml":
         raise InputError(f"--out: must end in .toml, got {str(out)!r}")

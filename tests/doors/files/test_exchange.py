@@ -239,7 +239,7 @@ def test_export_refuses_a_massless_link_by_its_name():
 def test_export_refuses_an_unknown_format_and_import_a_missing_file(tmp_path, capsys):
     assert main(["export", "bricard", "--out", str(tmp_path / "five.obj")]) == 2
     assert "no format writes .obj; known: .xml" in capsys.readouterr().err
-    assert main(["import", str(tmp_path / "none.xml")]) == 2
+    assert main(["import", str(tmp_path / "none.xml")]) == main(["import", "."]) == 2
     assert "none.xml" in capsys.readouterr().err
 
 
