@@ -67,7 +67,7 @@ def test_shown_numbers_have_six_digits_of_the_largest():
     assert shortened(empty) == {"a": {"position": [], "orientation": []}}
 
 
-def test_crossings_with_several_branches_are_shown_before_others():
+def test_crossings_with_several_branches_are_shown_instead_of_others():
     """Crossings are numbered from 1. Shown are at most two with several branches, or else the first one."""
     alone, several = {"velocity": [1]}, {"velocity": [1, 2]}
     assert shown([alone, several, several, several]) == [2, 3]

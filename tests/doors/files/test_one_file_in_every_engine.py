@@ -36,7 +36,7 @@ from reports.blocks import Moving
 from reports.robot_files import blocks
 
 ROUNDING = 1e-12  # m, rad, kg, kg m² of numbers near one, after some rotations
-NOT_OURS = ("spring polynomial", "damping polynomial", "coupling polynomial")
+NOT_OURS = ("spring polynomial", "damping polynomial")
 READERS = "tests.helpers.planted_readers"
 LOOP = pair(
     '<connect name="close" body1="lower" body2="other" anchor="0.1 0 0.1"/>'
@@ -112,8 +112,8 @@ def test_corpus_means_what_the_specification_says(form: str, tmp_path: Path):
 
 @pytest.mark.parametrize("step", [6, pytest.param(1, marks=pytest.mark.slow)], ids=["few", "all"])
 def test_own_import_builds_the_machine_of_each_file_of_the_corpus(step: int, tmp_path: Path):
-    """The machine is the file's except for limits and friction of joints, which no scene has. Files of
-    NOT_OURS have springs, dampers or couplings by polynomials, which the import leaves out."""
+    """The machine is the file's except for limits and friction of joints, which the import leaves out. Files
+    of NOT_OURS have springs or dampers by polynomials, of which a scene has the first number."""
     for case in (case for case in CASES[::step] if case.name not in NOT_OURS):
         path = written(tmp_path, case.text, case.file)
         own = Own().load(path, case.form).machine()

@@ -175,8 +175,8 @@ def test_chosen_columns_have_the_units_and_places_of_their_headers(headers, colu
 
 
 def test_column_below_the_tolerance_and_column_that_the_scene_lacks_are_stated(tmp_path, capsys):
-    """A weight of 10 N on a spring moves as 1 - A + A cos 2t, A = 1e-5 m. The energy 2 A² sin² 2t J is below
-    1e-7 J, 1e-8 of the scene's 10 J: a column of zeros is right only within that. `S.way` is no column."""
+    """A block of 10 N on a level spring moves as 1 - A + A cos 2t, A = 1e-5 m. Its energy 2 A² sin² 2t J is
+    below 1e-7 J, 1e-8 of the scene's 10 J: zeros are right only within that. `S.way` is no column."""
     size = 1e-5
     scene = Scene(
         name="slow",

@@ -34,7 +34,7 @@ def test_flat_rhombus_lists_its_smooth_and_its_folding_branch():
 
 
 def test_flat_five_bar_has_one_branch_at_every_crossing():
-    """The coupler stays parallel, so it cannot fold. In 0.05 s the crank is flat at 0 and -π."""
+    """The fifth bar keeps the coupler parallel: it cannot fold. In 0.05 s the crank is flat at 0 and -π."""
     crossings = simulate(five_bar(), "taylor", [0.05]).crossings
     assert len(crossings) == 2 and {c.sentence for c in crossings} == {"one branch"}
 

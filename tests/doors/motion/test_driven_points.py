@@ -106,7 +106,8 @@ def test_driver_of_a_point_is_a_driver_of_a_free_joint(tmp_path, capsys):
     ],
 )
 def test_faulty_drivers_of_points_are_refused_with_their_field(change, fault):
-    """The field is missing, of another kind, or unknown."""
+    """A message begins with the field: a name is missing or taken, a direction is zero, a body is unknown or
+    the ground, a joint is given too, or a unit is of an angle."""
     with pytest.raises(SceneError) as refusal:
         hanging({**tip(), **change})
     assert any(each.startswith(fault) for each in refusal.value.faults), refusal.value.faults

@@ -95,7 +95,7 @@ def test_offset_starts_at_a_pose_of_the_polynomial():
     """q₂ = 1.2 m + P(q₁) at the start and later; the file's poses do not satisfy it."""
     motion = mbref.simulate(cam("displacement").with_("coupling[cam].offset", 1.2), times=TIMES)
     q, value = (coordinate(motion, name)[0] for name in "AB")
-    assert np.abs(q[0]) > 0.1  # m
+    assert np.abs(q[0]) > 0.1  # m, by which the start moves A, too
     assert np.abs(value - 1.2 - P(q)).max() <= ROUNDED * np.abs(P(q)).max()
 
 
