@@ -20,6 +20,8 @@ from mbref import rotations
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import GROUND, Force, Joint, JointLoad, Moment, Scene, Spring
 
+SHORTEST = 1e-100  # s; the energy of crossing a mechanism in less time may not be finite
+
 
 def energy_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
     """Return the drift (k,) of energy minus work since t = 0, divided by the largest energy of the motion.
@@ -72,7 +74,7 @@ def _possible(scene: Scene, trajectory: Trajectory) -> float:
     It is the scale for rounding errors of positions and velocities.
     """
     length, mass = constraints.scene_length(scene), sum(body.mass or 0.0 for body in scene.body)
-    time = float(trajectory.times[-1]) or scene.duration
+    time = max(SHORTEST, float(trajectory.times[-1]) or scene.duration)
     forces = mass * float(np.linalg.norm(scene.gravity))
     forces += sum(float(np.linalg.norm(load.force)) for load in scene.load if isinstance(load, Force))
     return length * forces + mass * (length / time) ** 2 / 2

@@ -165,6 +165,7 @@ def test_judge_sees_a_miscounted_turn_of_few_samples_as_a_change_of_energy():
     few = mbref.simulate(wound_wheel(), times=[0.7, END])
     assert energy_series(few.mechanism, few).max() < CLOSE
     assert energy_series(few.mechanism, replace(few, angles=None)) is None
+    assert energy_series(few.mechanism, replace(few, times=1e-300 * few.times)) is None  # nothing moves
     turned = NATURAL * (1.0 - np.cos(2.0 * few.times))
     wrong = replace(few, angles={"H": few.angles["H"] + 2 * np.pi})
     change = STIFFNESS * 2 * np.pi * (turned - NATURAL + np.pi)
