@@ -9,6 +9,7 @@ import numpy as np
 from crosscheck.judge.constraints import joint_coordinates
 from crosscheck.judge.coupling_laws import bent_couplings
 from crosscheck.judge.joint_loads import turning_loads
+from crosscheck.judge.pieces import has_pieces
 from crosscheck.judge.truth import Truth
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
@@ -21,17 +22,18 @@ FINEST = 16  # multiple of DENSE at which the search for full turns between samp
 
 def counted_poses(scene: Scene, truth: Truth, times: np.ndarray) -> Trajectory:
     """Return the poses of a truth at times (k,), with the angles (k,) on which loads and couplings depend:
-    their full turns are the same whatever the times are.
+    their full turns are the same whatever the times are. In a scene whose constraints come and go they are
+    left out: each piece counts from its begin.
 
     Raises NoSolution if the motion is not known up to the last time.
     """
     found = truth.poses(times)
     names = {load.joint for load in turning_loads(scene)} | {c.joints[0] for c in bent_couplings(scene)}
-    if not names or not found.times.size:
+    if not names or has_pieces(scene) or not found.times.size:
         return found
     dense, motion = DENSE // 4, found
     while True:
-        angles = {name: _angles(scene, motion)[name] for name in names}
+        angles = {name: each for name, each in _angles(scene, motion).items() if name in names}
         if dense >= FINEST * DENSE or all(np.isfinite(angle).all() for angle in angles.values()):
             break
         dense *= 4
