@@ -87,15 +87,23 @@ def _moved(scene: Scene, event: Event) -> dict[str, np.ndarray]:
 def _between(motion: Trajectory, begin: float, end: float, turned: dict[str, float]) -> Trajectory:
     """Return the samples from begin to end (s), with times and angles (rad) from the begin."""
     chosen = (motion.times >= begin) & (motion.times < end)
-    arrays: dict[str, Any] = {k: None if (a := getattr(motion, k)) is None else a[chosen] for k in PER_BODY}
+    own = at_samples(motion, chosen)
+    angles = own.angles and {name: rows - turned.get(name, 0.0) for name, rows in own.angles.items()}
+    return replace(own, times=own.times - begin, angles=angles, events=None)
+
+
+def at_samples(trajectory: Trajectory, chosen: np.ndarray) -> Trajectory:
+    """Return the trajectory at some of its samples, by their indices (n,) or a mask (k,)."""
+    arrays: dict[str, Any] = {
+        key: None if (values := getattr(trajectory, key)) is None else values[chosen]
+        for key in ("times", *PER_BODY)
+    }
     tables: dict[str, Any] = {
         key: values and {name: rows[chosen] for name, rows in values.items()}
         for key in ("reactions", "angles")
-        for values in [getattr(motion, key)]
+        for values in [getattr(trajectory, key)]
     }
-    if tables["angles"]:
-        tables["angles"] = {n: rows - turned.get(n, 0.0) for n, rows in tables["angles"].items()}
-    return replace(motion, times=motion.times[chosen] - begin, **arrays, **tables, events=None)
+    return replace(trajectory, **arrays, **tables)
 
 
 def energy_error(scene: Scene, trajectory: Trajectory) -> float | None:

@@ -15,6 +15,7 @@ import numpy as np
 
 from crosscheck.judge import constraints, events
 from crosscheck.judge.energy import energy_series
+from crosscheck.judge.events import at_samples
 from crosscheck.judge.full_turns import counted_poses
 from crosscheck.judge.joint_reactions import SAMPLES, compare
 from crosscheck.judge.pieces import has_pieces
@@ -30,15 +31,7 @@ from mbref.scene import Scene
 MANY = 50  # bodies; the comparison of reactions is left out for more, because it would take too long
 
 
-STATES = (
-    "times",
-    "position",
-    "orientation",
-    "velocity",
-    "angular_velocity",
-    "acceleration",
-    "angular_acceleration",
-)
+STATES = ("times", *PER_BODY)
 KEPT = 16  # exact motions whose reactions are kept
 _with_reactions: dict[Any, Trajectory] = {}  # keyed by scene and states
 
@@ -234,17 +227,6 @@ def _known(trajectory: Trajectory, exact: Trajectory) -> Trajectory:
     """Return the trajectory at the samples of the truth."""
     count = len(exact.times)
     return trajectory if count == len(trajectory.times) else at_samples(trajectory, np.arange(count))
-
-
-def at_samples(trajectory: Trajectory, chosen: np.ndarray) -> Trajectory:
-    """Return the trajectory at some of its samples (n,)."""
-    arrays: dict[str, Any] = {k: None if (a := getattr(trajectory, k)) is None else a[chosen] for k in STATES}
-    tables: dict[str, Any] = {
-        key: values and {name: rows[chosen] for name, rows in values.items()}
-        for key in ("reactions", "angles")
-        for values in [getattr(trajectory, key)]
-    }
-    return replace(trajectory, **arrays, **tables)
 
 
 _error = _against_exact(error_series)

@@ -11,7 +11,7 @@ from statistics import median
 import numpy as np
 
 from crosscheck.engine import Setting, engine
-from crosscheck.judge.metrics import at_samples
+from crosscheck.judge.events import at_samples
 from crosscheck.judge.model_identity import along, differences, gate_times
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth import NoSolution, truth_for

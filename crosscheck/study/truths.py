@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.judge.metrics import at_samples, error_series
+from crosscheck.judge.events import at_samples
+from crosscheck.judge.metrics import error_series
 from crosscheck.judge.model_identity import gate_times
 from crosscheck.judge.reference.cache import mechanism
 from crosscheck.judge.reference.reference import NoReference, reference

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from crosscheck.conformance.suite import FAIL, PASS
-from crosscheck.judge.metrics import at_samples, error_series, in_scene_order
+from crosscheck.judge.events import at_samples
+from crosscheck.judge.metrics import error_series, in_scene_order
 from crosscheck.judge.start_accelerations import starts
 from crosscheck.setting import ORIGIN
 from crosscheck.study.difference import ERROR_RATIO, Change, Identity, changes

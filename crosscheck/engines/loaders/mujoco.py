@@ -154,10 +154,8 @@ class Compiled(Loaded):
                 points = (at[0:3], at[3:6]) if kind == kinds.mjEQ_CONNECT else (at[3:6], at[0:3])
                 bodies = self.body(first), self.body(second)
                 ends = self._point(first, points[0]), self._point(second, points[1])
-            is_turning = (
-                kind == kinds.mjEQ_WELD and not m.eq_data[e, 10]
-            )  # torquescale 0 leaves rotations free
-            what = "spherical" if is_turning else names[kind]
+            torque_scale = m.eq_data[e, 10]  # of a weld; at 0 the bodies turn freely
+            what = "spherical" if kind == kinds.mjEQ_WELD and not torque_scale else names[kind]
             yield Loop(str(m.equality(e).name) or f"equality {e}", what, bodies, ends)
 
     def _point(self, body: int, local: np.ndarray) -> Vector:

@@ -63,7 +63,7 @@ def test_built_in_engine_violates_no_check_on_six_probes(name):
     ],
 )
 def test_built_in_engine_violates_only_known_checks_of_couplings_relations_and_laws(name, scenes, related):
-    """The checks in KNOWN fail, for the reasons given there, and no other check fails."""
+    """KNOWN lists checks that fail, and why: each of them fails, and no other check does."""
     found = [verdict for scene in scenes for verdict in verdicts(name, scene, related)]
     failed = {(name, each.scene, each.property): each for each in found if each.status == "fail"}
     assert set(failed) == known(name, scenes), failed

@@ -168,7 +168,7 @@ def test_sweep_has_a_motion_for_values_that_are_equal_to_six_digits():
 
 
 def test_option_that_is_varied_twice_is_refused(capsys):
-    """Of two lists of values for one option the last one alone would be drawn."""
+    """A plot has the values of one list: a second list would replace the first one."""
     assert main(["plot", "four_bar", "--method", "lm1+baumgarte", *("--vary", "alpha=5") * 2]) == 2
     assert capsys.readouterr().err == "--vary: alpha is given twice; give it once\n"
 
