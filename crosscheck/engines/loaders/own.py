@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -39,6 +39,7 @@ from mbref.scene import GROUND, Scene, SlideSpring, TorsionSpring
 from mbref.scene import Joint as AnyJoint
 
 EVERYTHING = ("everything",)
+COORDINATES = {REVOLUTE: "angle", TRANSLATIONAL: "displacement"}
 MOVED = "the joints moved to close it"  # words of a note: the scene is not at the file's reference pose
 
 
@@ -118,6 +119,10 @@ class Imported(Loaded):
                 tree += self._two_hinges(joint, self.scene.joint_named(rods[joint.name]), pair)
                 continue
 
+            if joint.type == "cylindrical" and joint.name not in pitches:
+                tree += self._slide_and_hinge(joint, pair)
+                continue
+
             tree.append(
                 Joint(
                     joint.name,
@@ -126,7 +131,7 @@ class Imported(Loaded):
                     vector(anchors[0]),
                     _axis(joint),
                     pitch=pitches.get(joint.name),
-                    **(self._numbers(joint) if joint.type != FIXED else {}),
+                    **(self._numbers(joint, self._springs(joint)) if joint.type != FIXED else {}),
                 )
             )
         free = [body.name for body in self.scene.body if end(body.name) != end(GROUND)]
@@ -142,19 +147,31 @@ class Imported(Loaded):
 
     def _two_hinges(self, joint: AnyJoint, rod: AnyJoint, pair: tuple[str, str]) -> list[Joint]:
         link, axis = f"{joint.name} link", _axis(joint)
+        springs = self._springs(joint), self._springs(rod)
         first, second = (vector(anchor) for anchor in (rod.anchor_pair[0], joint.anchor_pair[1]))
         return [
-            Joint(joint.name, REVOLUTE, (pair[0], link), first, axis, **self._numbers(joint)),
-            Joint(rod.name, REVOLUTE, (link, pair[1]), second, axis, **self._numbers(rod)),
+            Joint(joint.name, REVOLUTE, (pair[0], link), first, axis, **self._numbers(joint, springs[0])),
+            Joint(rod.name, REVOLUTE, (link, pair[1]), second, axis, **self._numbers(rod, springs[1])),
         ]
 
-    def _numbers(self, joint: AnyJoint) -> dict[str, Any]:
-        """Return the numbers of a joint; a scene has neither limits nor dry friction."""
-        springs = [
-            load
-            for load in self.scene.load
-            if isinstance(load, TorsionSpring | SlideSpring) and load.joint == joint.name
-        ]
+    def _slide_and_hinge(self, joint: AnyJoint, pair: tuple[str, str]) -> list[Joint]:
+        """Return a cylindrical joint as two joints of the same bodies, each with its springs."""
+        anchor, axis, springs = vector(joint.anchor_pair[0]), _axis(joint), self._springs(joint)
+        slide = [spring for spring in springs if isinstance(spring, SlideSpring)]
+        turn = [spring for spring in springs if isinstance(spring, TorsionSpring)]
+        numbers = {
+            TRANSLATIONAL: self._numbers(joint, slide) | {"armature": 0.0},
+            REVOLUTE: self._numbers(joint, turn),
+        }
+        return [Joint(_single(joint, kind), kind, pair, anchor, axis, **numbers[kind]) for kind in numbers]
+
+    def _springs(self, joint: AnyJoint) -> list[TorsionSpring | SlideSpring]:
+        """Return the springs and dampers of a joint."""
+        kinds = TorsionSpring | SlideSpring
+        return [load for load in self.scene.load if isinstance(load, kinds) and load.joint == joint.name]
+
+    def _numbers(self, joint: AnyJoint, springs: Sequence[TorsionSpring | SlideSpring]) -> dict[str, Any]:
+        """Return the numbers of a joint with springs; a scene has neither limits nor dry friction."""
         stiffness = coefficients(sum(spring.stiffness for spring in springs))
         found: dict[str, Any] = {
             "damping": coefficients(sum(spring.damping for spring in springs)),
@@ -222,8 +239,12 @@ class Imported(Loaded):
         posed, scene = Posed(self.machine(), pose), self.scene
         v = np.array([rates.get(name, 0.0) for name in posed.joints])
         places = [posed.places[body.name].then(self._place(k)) for k, body in enumerate(scene.body)]
-        kinds = {REVOLUTE: "angle", TRANSLATIONAL: "displacement"}
-        values = {(kinds[j.type], j.name): pose.get(j.name, 0.0) for j in scene.joint if j.type in kinds}
+        values = {
+            (coordinate, joint.name): pose.get(_single(joint, kind), 0.0)
+            for joint in scene.joint
+            for kind, coordinate in COORDINATES.items()
+            if joint.type in (kind, "cylindrical")
+        }
         positions = np.array([place.position for place in places])
         turns = np.array([rotations.from_matrix(place.turn) for place in places])
         twists = (self._columns(posed) @ v).reshape(-1, 6)
@@ -250,6 +271,11 @@ def _axis(joint: AnyJoint) -> Vector | None:
     """Return the direction of a joint with one axis."""
     axes = joint.directions
     return vector(rotations.unit(np.array(axes[0], float))) if len(axes) == 1 else None
+
+
+def _single(joint: AnyJoint, kind: str) -> str:
+    """Return the name of a joint of one coordinate, which is the scene's joint or a part of it."""
+    return joint.name if joint.type == kind else f"{joint.name} {kind}"
 
 
 def _displacement(joint: Joint, moved: Mapping[str, Place]) -> float:

@@ -177,10 +177,10 @@ def carried_by(joint: str) -> str:
 
 
 DAMPED_HINGE = HINGE.replace("/>", ' damping="0.2"/>')
-TREES = {"tree": DAMPED_HINGE, "ball": '<joint type="ball"/>', "free": "<freejoint/>"}
+SPRUNG_LINE = '<joint name="s" type="slide" stiffness="9" damping="2"/><joint name="h" stiffness="3"/>'
+TREES = {"tree": DAMPED_HINGE, "line": SPRUNG_LINE, "ball": '<joint type="ball"/>', "free": "<freejoint/>"}
 
-
-DAMPED = {  # trees, also with a ball and a free joint, a loop and a coupling, each with dampers
+DAMPED = {  # trees, also with joints of several freedoms, a loop and a coupling, each with dampers
     **{name: carried_by(joint) for name, joint in TREES.items()},
     **{k: one_equality(k).replace('"elbow"', '"elbow" damping="0.3"', 1) for k in ("connect", "joint")},
 }
@@ -212,7 +212,7 @@ def test_constraint_rows_of_mujoco_are_the_files_at_four_closed_poses(kind, tmp_
 
 
 @pytest.mark.parametrize(
-    "what", [pytest.param("ball", marks=pytest.mark.slow), "free", "connect", "joint", "weld"]
+    "what", ["line", pytest.param("ball", marks=pytest.mark.slow), "free", "connect", "joint", "weld"]
 )
 def test_mbref_and_mujoco_end_runs_where_the_meaning_of_the_file_does(what: str, tmp_path: Path):
     """Runs of 0.1 s from a random state that obeys the equalities end where those of the file's own meaning
