@@ -12,6 +12,7 @@ from mbref.scene.joints import JOINT_TYPES
 from mbref.scene.units import fits
 
 COMES_AND_GOES = {"active": "intervals", "when": "a condition", "release": "a release"}  # field → its meaning
+NEED_A_HOLDING_JOINT = "armature", "stop"  # fields of a joint
 ALL_ROTATIONS = 3  # rotations that a joint with a single point leaves free
 
 
@@ -25,9 +26,11 @@ def _stop_faults(data: Mapping[str, Any], joints: list[Any]) -> Faults:
     """Yield end stops of driven coordinates, and their ends in other units than the coordinate's."""
     driven = {_text(driver, "joint") for driver in listed(data.get("driver", ()))}
     for i, joint in enumerate(joints):
-        kind, stop = _text(joint, "type"), field_of(joint, "stop")
+        if not (stop := field_of(joint, "stop")):
+            continue
+        kind = _text(joint, "type")
         coordinate = JOINT_TYPES[kind].facts.driven if kind in JOINT_TYPES else None
-        if not stop or coordinate is None:
+        if coordinate is None:
             continue
         if _text(joint, "name") in driven - {""}:
             yield f"joint[{i}].stop", "needs a joint without a driver, which prescribes the coordinate"
@@ -38,7 +41,7 @@ def _stop_faults(data: Mapping[str, Any], joints: list[Any]) -> Faults:
 
 def _sometimes(entry: Any, fields: Iterable[str] = COMES_AND_GOES) -> bool:
     """Return whether a raw joint or coupling has intervals or conditions."""
-    return any(field_of(entry, field) is not None for field in fields)
+    return any([field_of(entry, field) is not None for field in fields])
 
 
 def interval_faults(data: Mapping[str, Any]) -> Faults:
@@ -47,23 +50,29 @@ def interval_faults(data: Mapping[str, Any]) -> Faults:
     passing = {_text(joint, "name") for joint in joints if _sometimes(joint)}
     for key in ("joint", "coupling"):
         for i, entry in enumerate(listed(data.get(key, ()))):
-            if not _sometimes(entry):
-                if field_of(entry, "engages") not in (None, "anywhere"):
-                    yield f"{key}[{i}].engages", "is of a constraint with intervals; give active or when, too"
-                if field_of(entry, "holds_at_start") is not None:
-                    yield f"{key}[{i}].holds_at_start", "is of a constraint with active, when or release"
-            elif field_of(entry, "holds_at_start") is False and not _sometimes(entry, ("active", "when")):
-                yield f"{key}[{i}].holds_at_start", "lets it never hold; give active or when, too"
-    for i, joint in enumerate(joints):
-        for field in ("armature", "stop"):
-            has = [COMES_AND_GOES[each] for each in COMES_AND_GOES if field_of(joint, each) is not None]
-            if has and field_of(joint, field):
-                yield f"joint[{i}].{field}", f"needs a joint that always holds, and this one has {has[0]}"
+            yield from _holding_faults(f"{key}[{i}]", entry, NEED_A_HOLDING_JOINT if key == "joint" else ())
     yield from _stop_faults(data, joints)
-    for path, given in _users(data):
+    for path, given in _users(data) if passing else ():
         for name in listed(given) or [given]:
             if isinstance(name, str) and name in passing:
                 yield path, f"needs a joint that always holds; {name!r} has intervals or conditions"
+
+
+def _holding_faults(path: str, entry: Any, needing: Iterable[str]) -> Faults:
+    """Yield the fields of a joint or coupling that contradict that it always holds, or that it does not, as
+    the ``needing`` ones do."""
+    has = [meaning for field, meaning in COMES_AND_GOES.items() if field_of(entry, field) is not None]
+    if not has:
+        if field_of(entry, "engages") not in (None, "anywhere"):
+            yield f"{path}.engages", "is of a constraint with intervals; give active or when, too"
+        if field_of(entry, "holds_at_start") is not None:
+            yield f"{path}.holds_at_start", "is of a constraint with active, when or release"
+        return
+    if field_of(entry, "holds_at_start") is False and not _sometimes(entry, ("active", "when")):
+        yield f"{path}.holds_at_start", "lets it never hold; give active or when, too"
+    for field in needing:
+        if field_of(entry, field):
+            yield f"{path}.{field}", f"needs a joint that always holds, and this one has {has[0]}"
 
 
 def _users(data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:

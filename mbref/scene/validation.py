@@ -251,12 +251,14 @@ def _condition_faults(data: Mapping[str, Any], types: Mapping[str, Any], known: 
     """Yield faults of the conditions of joints and couplings, with unknown joints and bodies."""
     for key in ("joint", "coupling"):
         for i, entry in enumerate(_entries(data, key)):
-            path, when = f"{key}[{i}]", field_of(entry, "when")
+            path, when, release = f"{key}[{i}]", field_of(entry, "when"), field_of(entry, "release")
+            if when is None and release is None:
+                continue
             yield from _joint_faults(
                 f"{path}.when.joint", field_of(when, "joint"), types, COUPLED, "be watched"
             )
             yield from _pair_faults(f"{path}.when.bodies", field_of(when, "bodies"), known)
-            other = field_of(field_of(entry, "release"), "joint")
+            other = field_of(release, "joint")
             yield from _joint_faults(f"{path}.release.joint", other, types, tuple(JOINT_TYPES), "release")
             yield from condition_faults(path, entry, types)
 
