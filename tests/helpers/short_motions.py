@@ -33,14 +33,12 @@ def made(name: str, bodies: list[Entry], joints: list[Entry], duration=0.3, **fi
 
 AXES = {"axes": [list(Z), [0.8, -0.6, 0.0]]}
 FIELDS: dict[str, dict[str, object]] = {
-    "fixed": {},
-    "revolute": {"axis": list(SKEW)},
+    **{kind: {} for kind in ("fixed", "spherical")},
     "universal": AXES,
-    "spherical": {},
-    "translational": {"axis": list(SKEW)},
-    "cylindrical": {"axis": list(SKEW)},
-    "planar": {"axis": list(SKEW)},
-    "inline": {"axis": list(SKEW)},
+    **{
+        kind: {"axis": list(SKEW)}
+        for kind in ("revolute", "translational", "cylindrical", "planar", "inline")
+    },
     "distance": {"anchors": [[0.5, 0.1, 0.0], [0.9, 0.3, 0.4]]},
 }
 
@@ -161,33 +159,29 @@ def driven_slide() -> Scene:
     return made("driven slide", bodies, joints, driver=driver)
 
 
+def hinged_with_a_point(first: str, z: float) -> tuple[list[Entry], list[Entry]]:
+    """Return two blocks on hinges, and a free joint of the second along an axis (1, 2, z) of a first body."""
+    bodies = [block("a", (0.4, 0.1, -0.1)), block("b", (0.8, 0.4, 0.2), 0.7)]
+    pins = [hinge("A", "ground", "a", (0.0, 0.0, 0.0), SKEW), hinge("B", "ground", "b", (1.0, 0.0, 0.0), Y)]
+    return bodies, [*pins, joint("D", "free", first, "b", (0.9, 0.5, 0.3), axis=[1.0, 2.0, z])]
+
+
 @motion
 def driven_between_bodies() -> Scene:
     """Return two blocks on hinges; a table drives a point of the second along an axis that the first carries,
     where a spring and a force act, too."""
-    bodies = [block("a", (0.4, 0.1, -0.1)), block("b", (0.8, 0.4, 0.2), 0.7)]
-    joints = [
-        hinge("A", "ground", "a", (0.0, 0.0, 0.0), SKEW),
-        hinge("B", "ground", "b", (1.0, 0.0, 0.0), Y),
-        joint("D", "free", "a", "b", (0.9, 0.5, 0.3), axis=[1.0, 2.0, 2.0]),
-    ]
     rows = [[0.0, 0.0], [0.1, 0.05], [0.2, -0.02], [0.3, -0.1], [0.4, 0.0]]
     damped = load("slide_spring", joint="D", stiffness=40.0, damping=2.0)
     along = [damped, load("joint_force", joint="D", force=3.0)]
-    return made("driven between bodies", bodies, joints, driver=[{"joint": "D", "table": rows}], load=along)
+    driver = [{"joint": "D", "table": rows}]
+    return made("driven between bodies", *hinged_with_a_point("a", 2.0), driver=driver, load=along)
 
 
 @motion
 def coupled_point() -> Scene:
     """Return two blocks on hinges; a point of the second moves along an axis by the angle of the first."""
-    bodies = [block("a", (0.4, 0.1, -0.1)), block("b", (0.8, 0.4, 0.2), 0.7)]
-    joints = [
-        hinge("A", "ground", "a", (0.0, 0.0, 0.0), SKEW),
-        hinge("B", "ground", "b", (1.0, 0.0, 0.0), Y),
-        joint("D", "free", "ground", "b", (0.9, 0.5, 0.3), axis=[1.0, 2.0, -2.0]),
-    ]
     coupling = [{"name": "C", "joints": ["D", "A"], "ratio": 0.4}]
-    return made("coupled point", bodies, joints, coupling=coupling)
+    return made("coupled point", *hinged_with_a_point("ground", -2.0), coupling=coupling)
 
 
 # Couplings and armatures.
@@ -316,26 +310,23 @@ def closed_chain(name: str, places: list[Point], closing: str = "revolute", spee
     return made(name, rods, joints, gravity=[0.0, -9.81, 0.0])
 
 
-CRANK, KNEE, PIVOT = (0.0, 0.0, 0.0), (0.15, 0.25, 0.0), (0.9, 0.0, 0.0)
-TOP = (0.75, 0.6, 0.0)
-MOTIONS |= {
-    "four hinges": partial(closed_chain, "four hinges", [CRANK, KNEE, TOP, PIVOT]),
-    "four hinges in the air": partial(
-        closed_chain, "four hinges in the air", [(*p[:2], 0.5) for p in (CRANK, KNEE, TOP, PIVOT)]
-    ),
-    "five hinges": partial(closed_chain, "five hinges", [CRANK, KNEE, TOP, (1.1, 0.4, 0.0), PIVOT]),
-    "slider-crank of hinges": partial(closed_chain, "slider-crank", [CRANK, KNEE, (0.8, 0.0, 0.0)], "inline"),
-    "crank on a ball": partial(closed_chain, "crank on a ball", [CRANK, KNEE, TOP, PIVOT], "spherical"),
-    "crank on a cylinder": partial(
-        closed_chain, "crank on a cylinder", [CRANK, KNEE, TOP, PIVOT], "cylindrical"
-    ),
+CRANK, KNEE, TOP, PIVOT = (0.0, 0.0, 0.0), (0.15, 0.25, 0.0), (0.75, 0.6, 0.0), (0.9, 0.0, 0.0)
+FOUR = [CRANK, KNEE, TOP, PIVOT]
+CHAINS: dict[str, tuple[list[Point], str]] = {
+    "four hinges": (FOUR, "revolute"),
+    "four hinges in the air": ([(*p[:2], 0.5) for p in FOUR], "revolute"),
+    "five hinges": ([CRANK, KNEE, TOP, (1.1, 0.4, 0.0), PIVOT], "revolute"),
+    "slider-crank of hinges": ([CRANK, KNEE, (0.8, 0.0, 0.0)], "inline"),
+    "crank on a ball": (FOUR, "spherical"),
+    "crank on a cylinder": (FOUR, "cylindrical"),
 }
+MOTIONS |= {name: partial(closed_chain, name, *chain) for name, chain in CHAINS.items()}
 
 
 @motion
 def two_loops_on_one_crank() -> Scene:
     """Return a crank that moves two rockers: six links, two loops, all hinges parallel."""
-    bar = closed_chain("two loops", [CRANK, KNEE, TOP, PIVOT])
+    bar = closed_chain("two loops", FOUR)
     rods = rod("c", KNEE, (-0.5, 0.5, 0.0)), rod("d", (-0.5, 0.5, 0.0), (-0.6, 0.0, 0.0))
     bodies = [*bar.model_dump()["body"], *rods]
     joints = [

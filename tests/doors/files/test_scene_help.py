@@ -2,7 +2,6 @@
 probable slip is a valid number that is likely to be a mistake, as an angle in degrees."""
 
 import json
-import math
 from importlib.resources import files
 from pathlib import Path
 
@@ -191,18 +190,12 @@ def test_only_a_single_hinge_axis_in_the_plane_of_a_planar_mechanism_is_a_probab
 
 
 @pytest.mark.parametrize(
-    ("motion", "value"),
-    [
-        ({"sine": {"amplitude": "30 deg", "phase": "90 deg"}}, math.pi / 6),
-        ({"polynomial": ["90 deg"]}, math.pi / 2),
-    ],
-    ids=["sine", "polynomial"],
+    "motion", [{"sine": {"amplitude": "30 deg", "phase": 1.6}}, {"polynomial": ["30 deg"]}]
 )
-def test_driver_that_does_not_begin_at_zero_is_refused_with_its_value_in_radians(motion, value):
-    """The value at t = 0 is 30° sin 90° = π/6, or 90° = π/2."""
-    with pytest.raises(SceneError, match="must be 0, motion is measured from t = 0; got ") as caught:
+def test_driver_that_does_not_begin_at_zero_is_refused_with_its_value_in_radians(motion):
+    """The value at t = 0 is 30° = 0.5236 rad, or 30° sin 1.6 = 0.5234 rad."""
+    with pytest.raises(SceneError, match=r"must be 0, motion is measured from t = 0; got 0\.523"):
         find_scene("four_bar").with_(driver=({"joint": "A", **motion},))
-    assert f"{value:.6g}" in str(caught.value)
 
 
 def test_orientation_in_degrees_is_refused_with_the_formula_of_the_quaternion():
@@ -273,21 +266,18 @@ def test_command_assemble_gives_a_link_its_length_and_diagnose_states_it(my_toml
     assert found["links"]["crank"] == {"A–B": pytest.approx(0.25)}
 
 
-def test_command_assemble_refuses_a_negative_length_and_two_lengths_of_a_pair(my_toml, capsys):
-    """The pair A-B is also the pair B-A."""
-    for lengths, said in ((["A-B=-1"], "got 'A-B=-1'"), (["A-B=0.25", "B-A=0.3"], "gives B-A twice")):
-        assert main(["assemble", my_toml, *(f"--length={length}" for length in lengths)]) == 2
-        assert said in capsys.readouterr().err
-
-
-def test_command_assemble_refuses_a_pair_of_joints_with_two_meanings(tmp_path, capsys):
-    """Joints are named A, B-C, C and A-B, so that A-B-C is a pair in two ways."""
+def test_command_assemble_refuses_lengths_that_are_wrong_or_have_two_meanings(tmp_path, capsys):
+    """The pair A-B is also the pair B-A. Joints are named A, B-C, C and A-B, so that A-B-C is a pair in two
+    ways."""
     named = zip(pinned_four_bar().joint, ("A", "B-C", "C", "A-B"), strict=True)
     joints = [joint.model_copy(update={"name": name}) for joint, name in named]
-    path = tmp_path / "hyphens.toml"
-    pinned_four_bar().with_(joint=joints).save(path)
-    assert main(["assemble", str(path), "--length=A-B-C=0.5"]) == 2
-    assert "may be the joints 'A' and 'B-C' or 'A-B' and 'C'" in capsys.readouterr().err
+    for path, scene in (("four", pinned_four_bar()), ("hyphens", pinned_four_bar().with_(joint=joints))):
+        scene.save(tmp_path / path)
+    ways = "may be the joints 'A' and 'B-C' or 'A-B' and 'C'"
+    wrong = [("four", ["A-B=-1"], "got 'A-B=-1'"), ("four", ["A-B=0.25", "B-A=0.3"], "gives B-A twice")]
+    for path, lengths, said in (*wrong, ("hyphens", ["A-B-C=0.5"], ways)):
+        assert main(["assemble", str(tmp_path / path), *(f"--length={length}" for length in lengths)]) == 2
+        assert said in capsys.readouterr().err
 
 
 def test_command_assemble_names_moved_joints_of_a_linkage_of_half_a_micrometre(tmp_path, capsys):
@@ -317,23 +307,18 @@ def test_command_run_refuses_a_file_with_another_ending(tmp_path, capsys):
     assert capsys.readouterr().err == said and not list(tmp_path.iterdir())
 
 
-def test_command_animate_draws_the_branches_of_a_crossing_side_by_side(tmp_path, monkeypatch):
-    """In 0.05 s the driven rhombus is flat twice, and has two branches at the second position: the picture of
-    the branches has a panel for each. The five-bar's first crossing has one branch, and one panel."""
+def test_command_animate_draws_the_branches_of_a_crossing_side_by_side(tmp_path, capsys, monkeypatch):
+    """The rhombus, driven at 124.8 rad/s from π/2, is flat for the second time after 3/2 π, at 0.0377595 s,
+    where it has two branches: the picture of the branches has a panel for each. A picture without --branches
+    shows one, and the command says so. The five-bar's first crossing has one branch, and one panel."""
     monkeypatch.chdir(tmp_path)
+    assert main(["animate", "four_bar", "--duration", "0.05"]) == 0
+    assert "position 2 at t = 0.0377595 s: 2 branches; --branches shows" in capsys.readouterr().out
     assert main(["animate", "four_bar", "--duration", "0.05", "--branches"]) == 0
     picture = (tmp_path / "four_bar-branches.svg").read_text()
     assert "branch 1, smooth" in picture and "branch 2" in picture
     assert main(["animate", "five_bar", "--duration", "0.05", "--crossing", "1"]) == 0
     assert "branch 2" not in (tmp_path / "five_bar-branches.svg").read_text()
-
-
-def test_command_animate_names_the_option_that_shows_several_branches(tmp_path, capsys, monkeypatch):
-    """The rhombus, driven at 124.8 rad/s from π/2, is flat for the second time after 3/2 π, at 0.0377595 s,
-    where it has two branches. A picture without --branches shows one, and the command says so."""
-    monkeypatch.chdir(tmp_path)
-    assert main(["animate", "four_bar", "--duration", "0.05"]) == 0
-    assert "position 2 at t = 0.0377595 s: 2 branches; --branches shows" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
