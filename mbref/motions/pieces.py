@@ -102,17 +102,20 @@ def next_piece(
     frame, placed = scene_at(with_permanent(scene), state, t), scene_at(bare(piece), state, t)
     before = {joint.name: joint for joint in placed.joint}
     held = {each.name for each in constraint_parts(piece)} - {*released} | {*engaged}
-    holding = _holding(scene, held)
     joints = [
-        engaged_joint(scene, scene.joint_named(name), state, t) if name in engaged else before[name]
-        for name in (joint.name for joint in holding["joint"])
+        engaged_joint(scene, scene.joint_named(joint.name), state, t)
+        if joint.name in engaged
+        else before[joint.name]
+        for joint in _holding(scene, held)["joint"]
     ]
     for coupling in scene.coupling:
         if coupling.name in engaged and coupling.engages == "given_pose":
             _refuse_coupling(scene, coupling, state, t)
-    couplings = [coupling_from(scene, each, state, {"offset": 0.0}) for each in holding["coupling"]]
-    old = frame.with_(joint=placed.joint, coupling=placed.coupling)
-    return old, frame.with_(joint=joints, coupling=couplings)
+    earlier, later = (
+        [coupling_from(scene, each, state, {"offset": 0.0}) for each in _holding(scene, names)["coupling"]]
+        for names in ({each.name for each in piece.coupling}, held)
+    )
+    return frame.with_(joint=placed.joint, coupling=earlier), frame.with_(joint=joints, coupling=later)
 
 
 def with_permanent(scene: Scene) -> Scene:

@@ -79,6 +79,20 @@ def test_scene_at_1_s_continues_the_motion_of_a_polynomial_coupling(lead):
     assert np.abs(later.position - motion.position[4:]).max() <= TOLERANCE
 
 
+@pytest.mark.parametrize("lead", ["angle", "displacement"])
+def test_polynomial_that_holds_for_a_while_has_the_slope_of_all_turns(lead):
+    """It holds from q₁ = 7 rad or m on, by an impact: (I₁ + P'² I₂) q₁' = I₁ ω just after, then its energy
+    is constant, also after it lets go, and q₂' = P' q₁' where it does, at 2 s."""
+    law = {**cam(lead).coupling[0].model_dump(), "active": [[7.0 / SPEED, 2.0]]}
+    motion = mbref.simulate(cam(lead, coupling=[law]), times=[7.0 / SPEED, 2.0, 3.0])
+    (q, rate, _), (_, follower, _) = coordinate(motion, "A"), coordinate(motion, "B")
+    slopes = P.deriv()(q[:2])
+    reduced = INERTIA["A"] + slopes**2 * INERTIA["B"]
+    wanted = INERTIA["A"] * SPEED / np.sqrt(reduced[0] * reduced[[0, 1, 1]])
+    assert np.abs(rate - wanted).max() <= TOLERANCE
+    assert np.abs(follower - slopes[[0, 1, 1]] * wanted).max() <= TOLERANCE
+
+
 def test_formulations_of_the_judge_agree_with_mbref_over_full_turns():
     """Both formulations agree to extended precision, and mbref with them to rounding; its joints, rates and
     accelerations obey the judge's equations of the coupling."""
