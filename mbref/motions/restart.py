@@ -11,6 +11,7 @@ from mbref.input_error import InputError
 from mbref.motions.joint_motion import joint_motion
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Load, Scene, TorsionSpring
+from mbref.scene.functions import Factor
 from mbref.scene.joints import ANGLE
 
 SAME_TIME = 1e-9  # difference of times / largest sample time that is rounding of a user's number
@@ -46,17 +47,18 @@ def scene_at(scene: Scene, motion: Trajectory, t: float) -> Scene:
     return placed.with_(
         body=bodies,
         driver=[driver.from_time(at) for driver in scene.driver],
-        load=[later for load in placed.load if (later := _from_time(load, at)) is not None],
+        load=[_from_time(load, at) for load in placed.load],
         duration=scene.duration - at if scene.duration > at else scene.duration,
     )
 
 
-def _from_time(load: Load, t: float) -> Load | None:
-    """Return the load with a factor of the time since t (s); None if it is switched off from then on."""
+def _from_time(load: Load, t: float) -> Load:
+    """Return the load with a factor of the time since t (s): zero if it is switched off from then on, so that
+    all loads keep their places."""
     if load.over_time is None:
         return load
-    factor = load.over_time.from_time(t)
-    return None if factor is None else load.model_copy(update={"factor": factor})
+    factor = load.over_time.from_time(t) or Factor(polynomial=(0.0,))
+    return load.model_copy(update={"factor": factor})
 
 
 def sample_at(motion: Trajectory, t: float) -> int:

@@ -36,6 +36,18 @@ def test_scene_at_a_sample_continues_the_motion(name):
     assert np.abs(rest.angular_velocity[0] - whole.angular_velocity[1]).max() < CLOSE
 
 
+def test_scene_at_keeps_the_numbers_of_loads_after_one_is_switched_off():
+    """From 0.02 s on load 0 is zero, and load 1 has at 0.05 s the power of the whole run."""
+    motors = [
+        {"type": "joint_torque", "joint": "A", "torque": 1.0, **more}
+        for more in ({"factor": {"stop": 0.02}}, {})
+    ]
+    motion = mbref.simulate(mbref.find_scene("planar_slider_crank").with_(load=motors), times=[0.0, 0.05])
+    later = mbref.simulate(motion.scene_at(0.05), times=[0.0])
+    assert later.load_at(0).power[0] == 0.0
+    assert later.load_at(1).power[0] == pytest.approx(motion.load_at(1).power[1], rel=CLOSE)
+
+
 def test_scene_at_a_time_without_sample_is_refused_with_the_nearest_one(crank):
     with pytest.raises(mbref.InputError, match=r"no sample at 0\.03 s; the nearest one is at 0\.05 s"):
         crank.scene_at(0.03)
