@@ -186,6 +186,13 @@ class Method:
         MethodError
             If no part, or more than one, has the option, or the value is not positive.
         """
+        part, key = self.option_named(name)
+        own = {**self.options.get(part, {}), key: _checked(part, key, value)}
+        return replace(self, options={**self.options, part: own})
+
+    def option_named(self, name: str) -> tuple[str, str]:
+        """Return the part and the option of a name such as ``"alpha"`` or ``"baumgarte.alpha"``; raises
+        MethodError as ``with_option``."""
         of_part, _, key = name.rpartition(".")
         found = [p for p in self.parts if key in p.options and of_part in ("", p.name)]
         if self.is_series:
@@ -193,8 +200,7 @@ class Method:
         if len(found) != 1:
             known = [f"{p.name}.{option}" for p in self.parts for option in p.options]
             raise MethodError(f"{self}: {len(found)} parts have an option {name!r}; known: {_listed(known)}")
-        own = {**self.options.get(found[0].name, {}), key: _checked(found[0].name, key, value)}
-        return replace(self, options={**self.options, found[0].name: own})
+        return found[0].name, key
 
     @staticmethod
     @functools.lru_cache(maxsize=MOST_NAMES)

@@ -54,7 +54,7 @@ def sweep(
     MethodError
         If the method has no such option, or a value is negative.
     InputError
-        If there are no values, or more than 100 combinations.
+        If there are no values, more than 100 combinations, or two names of one option.
     """
     scene = find_scene(scene)
     methods = methods_of(method, options)
@@ -69,6 +69,10 @@ def methods_of(method: Method | str, options: Mapping[str, Sequence[float]]) -> 
     count = int(np.prod([len(values) for values in options.values()]))
     if count > MOST_RUNS:
         raise InputError(f"options: {count} combinations; a sweep has at most {MOST_RUNS}")
+    owned: dict[tuple[str, str], str] = {}
+    for name in options:
+        if (first := owned.setdefault(base.option_named(name), name)) != name:
+            raise InputError(f"options: {first!r} and {name!r} are one option; give it once")
     found = {}
     for values in itertools.product(*options.values()):
         changed = base

@@ -82,21 +82,15 @@ def two(tmp_path, monkeypatch) -> tuple[str, ...]:
     return ("run", path, "--engine", FAKE, "--setting", "plain", "--samples", "3")
 
 
-def test_a_scene_without_a_closed_form_is_judged_by_its_reference(capsys, two):
+def test_a_scene_without_a_closed_form_is_judged_by_its_reference_if_it_has_time(capsys, two):
     """FAKE leaves two bodies at rest, where no force acts: its error is zero. The bound of the reference's
-    error is the least one that the judge states, 1e-14."""
-    _, out, _ = run_main(capsys, *two, "--json")
-    measured = [record["metrics"] for record in json.loads(out)["records"]]
-    assert [(m["error"], m["error_bound"]) for m in measured] == [(0.0, 1e-14)] * 2, measured
-
-
-def test_reference_time_of_zero_leaves_the_error_unknown_and_says_why(capsys, two):
-    """No closed form of the scene is known: only a reference, here in 20 s, can be its truth."""
-    _, out, _ = run_main(capsys, *two, "--reference-time", "0", "--json")
-    assert json.loads(out)["records"][0]["metrics"]["error"] is None
+    error is the least one that the judge states, 1e-14. Without a reference the error is unknown."""
     sentence = "There is no reference for two: no reference was requested."
-    assert sentence in run_main(capsys, *two, "--reference-time", "0")[1]
-    assert sentence not in run_main(capsys, *two, "--reference-time", "20")[1]
+    for seconds, wanted in (("0", (None, None)), ("20", (0.0, 1e-14))):
+        asked = (*two, "--reference-time", seconds)
+        measured = [r["metrics"] for r in json.loads(run_main(capsys, *asked, "--json")[1])["records"]]
+        assert [(m["error"], m["error_bound"]) for m in measured] == [wanted] * 2, measured
+        assert (sentence in run_main(capsys, *asked)[1]) == (seconds == "0")
 
 
 def test_json_of_two_scenes_is_a_list_in_their_order(capsys, tmp_path):
@@ -322,11 +316,7 @@ NOT_REACHED = {  # error of the only run, bound of its truth's error, outcome: t
 }
 
 
-@pytest.mark.parametrize(
-    ("error", "bound", "outcome"),
-    NOT_REACHED,
-    ids=["error too large", "truth too rough", "no truth", "no completed run"],
-)
+@pytest.mark.parametrize(("error", "bound", "outcome"), NOT_REACHED)
 def test_tune_says_why_no_run_reaches_the_error(error, bound, outcome):
     """The error asked for is 1e-8; there is one run, and ``bound`` is the error of the truth. Of the four
     sentences of NOT_REACHED, only the one for this run is printed."""

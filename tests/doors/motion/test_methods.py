@@ -168,9 +168,11 @@ def test_sweep_has_a_motion_for_values_that_are_equal_to_six_digits():
 
 
 def test_option_that_is_varied_twice_is_refused(capsys):
-    """A plot has the values of one list: a second list would replace the first one."""
+    """A plot has the values of one list: a second list would replace the first one, also by another name."""
     assert main(["plot", "four_bar", "--method", "lm1+baumgarte", *("--vary", "alpha=5") * 2]) == 2
     assert capsys.readouterr().err == "--vary: alpha is given twice; give it once\n"
+    with pytest.raises(mbref.InputError, match=r"'alpha' and 'baumgarte\.alpha' are one option"):
+        mbref.sweep("four_bar", "lm1+baumgarte", {"alpha": [1.0], "baumgarte.alpha": [2.0]})
 
 
 def test_option_of_two_parts_of_a_method_is_varied_by_the_name_of_its_part():
