@@ -267,8 +267,9 @@ def _number_of_variants(
     x, v = np.array([(displacement(start.q, each.q), each.v) for each in found]).swapaxes(0, 1)
     stencil, step, packs = variants.stencil, variants.step, variants.packs
     own = slice(variants.first, variants.first + len(starts))
-    arrays = x / base.units, v / base.units, *(each[own] for each in _arrays(packs))
+    arrays = v / base.units, *(each[own] for each in _arrays(packs))
     error = max(_stencil_error(values, stencil, step) for values in arrays)
+    error = max(error, _stencil_error(x / base.units, stencil, step, size=1.0))
     weights = stencil.weights / step
     data = _weighted(row_of(packs.data, own), weights)
     return SceneNumber(
@@ -284,12 +285,13 @@ def _weighted(values: Any, weights: np.ndarray) -> Any:
     return (weights @ differences).reshape(values.shape[1:])
 
 
-def _stencil_error(values: np.ndarray, stencil: Stencil, step: float) -> float:
+def _stencil_error(values: np.ndarray, stencil: Stencil, step: float, size: float = 0.0) -> float:
     """Return the relative error of the derivative of values (offsets, …) that change beyond rounding: the
-    difference from the lower order, and one rounding."""
+    difference from the lower order, and one rounding. ``size`` is of numbers whose differences the values
+    are, as displacements are of poses."""
     table = values.reshape(len(values), -1)
     changes = np.abs(table - table[0]).max(axis=0)
-    table = table[:, changes > CHANGED_ROUNDINGS * EPSILON * np.abs(table).max(initial=0.0)]
+    table = table[:, changes > CHANGED_ROUNDINGS * EPSILON * np.abs(table).max(initial=size)]
     found, lower = (weights @ table / step for weights in (stencil.weights, stencil.lower))
     scale = np.abs(found).max(initial=0.0)
     rounded = EPSILON * np.abs(table).max(initial=0.0) / step

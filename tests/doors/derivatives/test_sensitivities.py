@@ -54,12 +54,22 @@ def angle_of_pendulum(times, mass, inertia, x, y, gravity, start):
     return 2 * np.arcsin(k * np.sin(phase)) - given
 
 
-def test_derivatives_of_a_pendulums_angle_equal_those_of_jacobis_function():
+WHEELS = {name: (float(k), 1.0, 0.0) for k, name in enumerate("BC")}
+GEARS = {
+    "body": [body(f"wheel {name}", 1.0, [0.1] * 3, place) for name, place in WHEELS.items()],
+    "joint": [hinge(name, "ground", f"wheel {name}", place) for name, place in WHEELS.items()],
+    "coupling": [{"name": "gears", "joints": ["B", "C"], "ratio": 1.5, "offset": 0.3}],
+}
+
+
+@pytest.mark.parametrize("beside", [{}, GEARS], ids=["alone", "gears that an offset moves"])
+def test_derivatives_of_a_pendulums_angle_equal_those_of_jacobis_function(beside):
     """The closed form is differentiated by a complex step; stated errors are at least 1/10 of true ones."""
+    scene = pendulum().with_(**{key: [*getattr(pendulum(), key), *parts] for key, parts in beside.items()})
     numbers = {"mass": 1.3, "inertia": 0.07, "x": 0.0, "y": 0.0, "gravity": -GRAVITY, "start": 0.0}
     paths = ["body[bob].mass", "body[bob].inertia[2]", "joint[A].anchor.x", "joint[A].anchor.y"]
     times = np.array([0.3, 1.7])
-    found = mbref.sensitivities(pendulum(), ["A.angle"], [*paths, "gravity.y", "joint[A].angle(0)"], times)
+    found = mbref.sensitivities(scene, ["A.angle"], [*paths, "gravity.y", "joint[A].angle(0)"], times)
     for k, name in enumerate(numbers):
         true = slope(lambda **n: angle_of_pendulum(times, **n), numbers, name)
         assert_close(found.values[:, 0, k], true)
