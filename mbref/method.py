@@ -191,8 +191,18 @@ class Method:
         return replace(self, options={**self.options, part: own})
 
     def option_named(self, name: str) -> tuple[str, str]:
-        """Return the part and the option of a name such as ``"alpha"`` or ``"baumgarte.alpha"``; raises
-        MethodError as ``with_option``."""
+        """Return the name of the part and of the option that a name means.
+
+        Parameters
+        ----------
+        name : str
+            As for ``with_option``.
+
+        Raises
+        ------
+        MethodError
+            If no part, or more than one, has the option.
+        """
         of_part, _, key = name.rpartition(".")
         found = [p for p in self.parts if key in p.options and of_part in ("", p.name)]
         if self.is_series:

@@ -92,9 +92,8 @@ class Motion(Trajectory):
     def scene_at(self, t: float) -> Scene:
         """Return the scene that starts with the state at a sample time, and then moves as this motion.
 
-        Its time counts from t: drivers and factors of loads are shifted, natural angles and displacements of
-        springs at joints count from the new poses, and couplings have no offsets. Loads keep their places:
-        one that is switched off from t on has the factor 0.
+        Its time counts from t: drivers and factors of loads are shifted (a load that has ended has the factor
+        0), natural values of springs at joints count from the new poses, and couplings have no offsets.
 
         Parameters
         ----------
