@@ -30,14 +30,19 @@ def columns_of_numbers(given: NumberTable, what: str) -> dict[str, np.ndarray]:
 
 
 def _read(path: str | Path) -> dict[str, np.ndarray]:
-    """Return the columns of a CSV file with a line of their names."""
+    """Return the columns of a CSV file with a line of their names: with commas between numbers, or with ``;``
+    and decimal commas or points."""
     with open(path, encoding="utf-8-sig", newline="") as file:
-        names, *rows = [*csv.reader(file)] or [[]]
+        lines = [line for line in file.read().splitlines() if line.strip()]
+    mark = ";" if lines and ";" in lines[0] else ","
+    names, *rows = [*csv.reader(lines, delimiter=mark)] or [[]]
+    names = [name.strip() for name in names]
     if uneven := [k for k, row in enumerate(rows, 1) if len(row) != len(names)]:
         raise InputError(f"{path}: row {uneven[0]} of the numbers needs {len(names)} of them")
     try:
         cells = [[cell.strip() or "nan" for cell in row] for row in rows]
-        table = np.array(cells, dtype=float).reshape(len(rows), len(names))
+        decimal = [[cell.replace(",", ".") for cell in row] if mark == ";" else row for row in cells]
+        table = np.array(decimal, dtype=float).reshape(len(rows), len(names))
     except ValueError as fault:
         raise InputError(f"{path}: needs a line of names, and lines of numbers: {fault}") from None
     for name in names:

@@ -221,7 +221,7 @@ def test_start_whose_crank_cannot_turn_is_left_for_a_random_one():
 def test_command_writes_the_scene_and_says_that_points_are_not_reached(tmp_path, capsys):
     """The scene has the mean, (1.15, 0.2), with x at its bound 1.1; an empty cell gives no condition."""
     arm().save(tmp_path / "arm.toml")
-    (tmp_path / "points.csv").write_text("time,arm.position.x,arm.position.y\n0.0,1.15,0.2\n1.0,1.15,\n")
+    (tmp_path / "points.csv").write_text("time, arm.position.x,arm.position.y\n0.0,1.15,0.2\n1.0,1.15,\n\n")
     files = ["--follow", str(tmp_path / "points.csv"), "--out", str(tmp_path / "found.toml")]
     let = ["--let", f"{ARM[0]} 0.5 1.1", "--let", ARM[1]]
     assert main(["design", str(tmp_path / "arm.toml"), *let, *files, "--starts", "1"]) == 0
