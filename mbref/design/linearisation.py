@@ -55,11 +55,12 @@ class Tangent:
         self.rows: ConstraintRows = before.rows if before else ConstraintRows(model, q)
         allowed = self.rows.allowed(terms, before.basis if before else None)
         self.conditioning, free = allowed.conditioning, allowed.free
-        self.at_rest, self.weight = by_gauss(model, terms, allowed), terms.mass * model.units**2
+        self.weight = terms.mass * model.units**2
         squares, axes = np.linalg.eigh(free.T @ (self.weight[:, None] * free))
         self.mass = float(squares.max(initial=0.0))
         if squares.size and not squares.min() > WEIGHTLESS * self.mass:
-            raise SceneError(["body: no mass resists a motion that the joints allow, so it has no vibration"])
+            raise _weightless(model, free @ axes[:, 0])
+        self.at_rest = by_gauss(model, terms, allowed)
         self.basis = free @ (axes * np.sqrt(self.mass / squares))
         inwards = frame.relative(model, q, np.zeros(model.n), np.zeros(model.n)) / model.units
         self.forces = norms_by_body(terms.force * model.units) + norms_by_body(self.weight * inwards)
@@ -170,6 +171,15 @@ class Tangent:
     def rate_scale(self) -> float:
         """Rate, 1/s, of motions by the forces over one length of the mechanism; 1 without forces."""
         return float(np.sqrt((self.pushes / self.sizes).max(initial=0.0))) or 1.0
+
+
+def _weightless(model: Model, x: np.ndarray) -> SceneError:
+    """Return the error of a motion x (n,) without mass; it names the body that moves most."""
+    moves = norms_by_body(x).reshape(-1, 2)
+    body, part = np.unravel_index(int(moves.argmax()), moves.shape)
+    name, field = model.scene.body[body].name, ("mass", "inertia")[part]
+    what = "resists a motion of it that the joints allow, so that the motion has no vibration"
+    return SceneError([f"body[{name}].{field}: no {field} {what}"])
 
 
 def norms_by_body(x: np.ndarray) -> np.ndarray:

@@ -54,6 +54,8 @@ def angle_of_pendulum(times, mass, inertia, x, y, gravity, start):
     return 2 * np.arcsin(k * np.sin(phase)) - given
 
 
+SWUNG = np.array([0.3, 1.7])  # s
+NUMBERS = {"mass": 1.3, "inertia": 0.07, "x": 0.0, "y": 0.0, "gravity": -GRAVITY, "start": 0.0}
 WHEELS = {name: (float(k), 1.0, 0.0) for k, name in enumerate("BC")}
 GEARS = {
     "body": [body(f"wheel {name}", 1.0, [0.1] * 3, place) for name, place in WHEELS.items()],
@@ -66,12 +68,10 @@ GEARS = {
 def test_derivatives_of_a_pendulums_angle_equal_those_of_jacobis_function(beside):
     """The closed form is differentiated by a complex step; stated errors are at least 1/10 of true ones."""
     scene = pendulum().with_(**{key: [*getattr(pendulum(), key), *parts] for key, parts in beside.items()})
-    numbers = {"mass": 1.3, "inertia": 0.07, "x": 0.0, "y": 0.0, "gravity": -GRAVITY, "start": 0.0}
     paths = ["body[bob].mass", "body[bob].inertia[2]", "joint[A].anchor.x", "joint[A].anchor.y"]
-    times = np.array([0.3, 1.7])
-    found = mbref.sensitivities(scene, ["A.angle"], [*paths, "gravity.y", "joint[A].angle(0)"], times)
-    for k, name in enumerate(numbers):
-        true = slope(lambda **n: angle_of_pendulum(times, **n), numbers, name)
+    found = mbref.sensitivities(scene, ["A.angle"], [*paths, "gravity.y", "joint[A].angle(0)"], SWUNG)
+    for k, name in enumerate(NUMBERS):
+        true = slope(lambda **n: angle_of_pendulum(SWUNG, **n), NUMBERS, name)
         assert_close(found.values[:, 0, k], true)
         assert (np.abs(found.values[:, 0, k] - true) <= MOST_ERRORS * found.errors[:, 0, k]).all()
 
@@ -80,10 +80,8 @@ def test_number_of_a_body_that_is_called_point_is_no_coordinate_of_a_point():
     """Steps of differences fit the inertia, 1e-6 kg m², not the length of the pendulum, 0.5 m."""
     bob = body("point", 1.3, [1e-6] * 3, (0.3, -0.4, 0.0))
     scene = pendulum().with_(body=[bob], joint=[hinge("A", "ground", "point", (0.0, 0.0, 0.0))])
-    numbers = {"mass": 1.3, "inertia": 1e-6, "x": 0.0, "y": 0.0, "gravity": -GRAVITY, "start": 0.0}
-    times = np.array([0.3, 1.7])
-    found = mbref.sensitivities(scene, ["A.angle"], ["body[point].inertia[2]"], times)
-    true = slope(lambda **n: angle_of_pendulum(times, **n), numbers, "inertia")
+    found = mbref.sensitivities(scene, ["A.angle"], ["body[point].inertia[2]"], SWUNG)
+    true = slope(lambda **n: angle_of_pendulum(SWUNG, **n), {**NUMBERS, "inertia": 1e-6}, "inertia")
     assert_close(found.values[:, 0, 0], true)
 
 

@@ -297,12 +297,9 @@ def pinned_four_bar() -> Scene:
     return scene.with_(joint=pins)
 
 
-RUN = ["run", "planar_slider_crank", "--duration", "0.01", "--samples", "3"]
-
-
 def test_command_run_refuses_a_file_with_another_ending(tmp_path, capsys):
     """Standard error has one line, and no file is written."""
-    assert main([*RUN, "--out", str(tmp_path / "run.txt")]) == 2
+    assert main(["run", "four_bar", "--duration", "0.01", "--out", str(tmp_path / "run.txt")]) == 2
     said = f"--out: must end in .csv or .json, got '{tmp_path / 'run.txt'}'\n"
     assert capsys.readouterr().err == said and not list(tmp_path.iterdir())
 

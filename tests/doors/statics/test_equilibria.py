@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from mbref import Scene, equilibria
+from mbref import Scene, SceneError, equilibria
 from mbref.cli.commands import main
 from tests.helpers import parts
 from tests.helpers.statics import DOWN, ORIGIN, G, ball_linkage, hinge, parallelogram, pendulum, rod, slide
@@ -198,8 +198,11 @@ def test_angle_of_a_wheel_that_no_force_turns_makes_one_indifferent_equilibrium(
     turned = {"orientation": [np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)]}
     bodies = [rod("rod", (0.0, -ARM, 0.0)), rod("wheel", (0.0, -2 * ARM, 0.0), 1.0) | turned]
     joints = [hinge("A", ("ground", "rod")), hinge("W", ("rod", "wheel"), (0.0, -2 * ARM, 0.0))]
-    found = equilibria(Scene(name="wheel", gravity=DOWN, body=bodies, joint=joints), starts=5)
+    scene = Scene(name="wheel", gravity=DOWN, body=bodies, joint=joints)
+    found = equilibria(scene, starts=5)
     assert [each.stability for each in found if each.scene.body[0].position[1] < 0] == ["indifferent"]
+    with pytest.raises(SceneError, match=r"body\[wheel\]\.inertia: no inertia resists a motion"):
+        equilibria(scene.with_("body[wheel].inertia", [0.0] * 3))
 
 
 @pytest.mark.parametrize("gravity", [DOWN, (3.0, -5.0, -7.0)])
