@@ -91,7 +91,7 @@ def identity(record: Record) -> Identity:
         record["scene"],
         asked["engine"],
         record["family"],
-        json.dumps(asked["options"]),
+        json.dumps(asked["options"], sort_keys=True),
         json.dumps(when),
     )
 

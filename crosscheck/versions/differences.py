@@ -98,7 +98,7 @@ def _by_request(document: Mapping[str, Any]) -> dict[Identity, Record]:
     """Return the records of a document by family and options. The machine is the same; times are no
     interleaved ones."""
     return {
-        ("", record["engine"], record["method"], repr(record["asked"]["options"]), ""): {
+        ("", record["engine"], record["method"], repr(sorted(record["asked"]["options"].items())), ""): {
             **record,
             "machine": None,
             "repeated": False,

@@ -82,8 +82,11 @@ def test_interleaved_times_of_a_folder_replace_those_of_its_records(tmp_path):
 
 
 def test_records_are_loaded_by_scene_engine_family_options_and_samples(tmp_path):
-    """Two records of families f and g; their file is given by its path or by its folder's."""
-    place = stored(tmp_path, {"key": "k1"}, {"key": "k2", "family": "g"})
+    """Two records of families f and g; their file is given by its path or by its folder's. The third record
+    has the options of the second in another order, and replaces it."""
+    two, turned = ({"engine": "a", "options": dict.fromkeys(x, 0.1), "end": 1.0} for x in ("pq", "qp"))
+    asked = [{"key": key, "family": "g", "asked": ours} for key, ours in (("k2", two), ("k3", turned))]
+    place = stored(tmp_path, {"key": "k1"}, *asked)
     assert load(place / "records.jsonl") == load(place)
     [first, second] = load(place)
     assert first == ("s", "a", "f", '{"step": 0.1}', '{"samples": 3, "end": 1.0}') and second[2] == "g"
@@ -126,13 +129,10 @@ def test_runs_of_different_mechanisms_are_listed_without_comparison():
     one that names none, are compared: one change."""
     old, new = one(1e-5), one(1e-4)
     old["run"]["mechanism"], new["run"]["mechanism"] = "m1", "m2"
-    first, second = changes(old, new)
-    assert (first.old, first.new, first.sentences) == (None, new["run"], ["only in the new set"])
-    assert (second.old, second.new, second.sentences) == (old["run"], None, ["only in the old set"])
-    new["run"]["mechanism"] = "m1"
-    assert len(changes(old, new)) == 1
-    del new["run"]["mechanism"]
-    assert len(changes(old, new)) == 1, "a record that names no mechanism is compared"
+    alone = [(change.old, change.new, change.sentences) for change in changes(old, new)]
+    assert alone == [(None, new["run"], ["only in the new set"]), (old["run"], None, ["only in the old set"])]
+    for name in ("m1", None):
+        assert len(changes(old, {"run": {**new["run"], "mechanism": name}})) == 1, name
 
 
 def test_failed_runs_differ_by_their_outcome_or_by_their_end_beyond_rounding():
