@@ -6,7 +6,7 @@ from mbref.method import Method
 from mbref.stabilisation.all_coordinates import rates_and_balance
 from mbref.stepping.preparation import kernels_of
 from mbref.taylor.driven import follow_drivers
-from mbref.taylor.preparation import KERNELS_OF_SERIES
+from mbref.taylor.preparation import kernels_of_series
 
 METHODS = (
     "alf-dual+projection",
@@ -24,7 +24,7 @@ def prepare(backwards: bool = False) -> None:
     """Compile or load kernels of METHODS and the series. Processes from both ends share the work."""
     general = dict.fromkeys(kernel for name in METHODS for kernel in kernels_of(Method.parse(name)))
     # rates_and_balance: runs by a sparse formulation with redundant rows, without projection
-    kernels = [*general, *KERNELS_OF_SERIES, follow_drivers, rates_and_balance]
+    kernels = [*general, *kernels_of_series(), follow_drivers, rates_and_balance]
     prepare_all(kernels[::-1] if backwards else kernels)
 
 

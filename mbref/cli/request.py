@@ -114,8 +114,8 @@ class Request(NamedTuple):
         try:
             if self.method:
                 check_method(method, self.scene, self.limits)
-            if not are_compiled(method):
-                prepare(method)
+            if not are_compiled(method, self.scene):
+                prepare(method, self.scene)
             with progress_bar("simulating", float(self.times[-1])) as progress:
                 if check:
                     check(simulate(*self._replace(times=self.times[:1]), progress))

@@ -66,7 +66,8 @@ def run_all(scenes: Sequence[Scene], method: Method | str, times: np.ndarray, li
     method = Method.parse(method) if isinstance(method, str) else method
     preparation.prepare(method)  # before the clock, by which an ensemble chooses how many runs go together
     if method.is_series:
-        prepare_series()
+        for scene in scenes:
+            prepare_series(scene)
     began = time.thread_time()
     runs = _Runs(scenes, method, times, limits)
     for places in _by_shape(scenes):

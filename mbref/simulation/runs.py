@@ -43,18 +43,20 @@ MOST_TRIAL_STEPS = 2000  # largest number of steps of a trial, which takes a fra
 
 def start_run(scene: Scene, method: Method, times: np.ndarray, limits: Limits) -> Run:
     """Return the run of a scene, ready to be advanced; its stepper may raise NoGeneratedCode."""
+    stepper = _series_stepper(scene) if method.is_series else ExplicitStepper
     began = time.process_time()
-    run = Run(scene, method, times, limits, _series_stepper() if method.is_series else ExplicitStepper)
+    run = Run(scene, method, times, limits, stepper)
     run.built = time.process_time() - began - run.making
     return run
 
 
-def _series_stepper() -> Callable[[Run], Stepper]:
-    """Return the stepper of Taylor series, with its kernels loaded; other methods do not import it."""
+def _series_stepper(scene: Scene) -> Callable[[Run], Stepper]:
+    """Return the stepper of Taylor series, with its kernels for a scene loaded; other methods do not import
+    it."""
     from mbref.taylor.preparation import prepare_series
     from mbref.taylor.stepper import SeriesStepper
 
-    prepare_series()
+    prepare_series(scene)
     return SeriesStepper
 
 
@@ -153,9 +155,9 @@ def passes_with(run: Run, **changes: Any) -> bool | None:
 def _made(run: Run) -> Trial | None:
     if run.method.is_series or len(run.scene.body) > MOST_BODIES or without_series(run.scene):
         return None
-    from mbref.taylor.preparation import KERNELS_OF_SERIES  # other methods do not import the series otherwise
+    from mbref.taylor.preparation import kernels_of_series  # other methods do not import the series otherwise
 
-    if not all(kernel.is_kept for kernel in KERNELS_OF_SERIES):
+    if not all(kernel.is_kept for kernel in kernels_of_series(run.scene)):
         return None
     limits = Limits(code=GENERIC, most_steps=MOST_TRIAL_STEPS)
     trial = start_run(run.scene, Method.parse(SERIES_METHOD), run.times, limits)

@@ -196,24 +196,27 @@ def _check_branches(run: Run) -> None:
         )
 
 
-def prepare(method: Method) -> None:
-    """Compile the kernels of the method, or load them from the cache of this machine.
+def prepare(method: Method, scene: Scene | None = None) -> None:
+    """Compile the kernels of the method for a scene, or for every scene, or load them from the cache of this
+    machine.
 
     Kernels of `taylor` are included, because runs of other methods are compared with `taylor`.
     """
-    from mbref.taylor.preparation import KERNELS_OF_SERIES, prepare_series, prepare_series_backwards
+    from mbref.taylor.preparation import IN_EVERY_RUN, prepare_series, prepare_series_backwards
 
     beside = prepare_series_backwards
-    with compiled_in_background(KERNELS_OF_SERIES, beside.__module__, beside.__name__):
+    with compiled_in_background(IN_EVERY_RUN, beside.__module__, beside.__name__):
         preparation.prepare(method)
-        prepare_series()
+        prepare_series(scene)
 
 
-def are_compiled(method: Method) -> bool:
-    """Return whether the kernels of the method are in the cache of this machine."""
+def are_compiled(method: Method, scene: Scene) -> bool:
+    """Return whether the kernels of the method for a scene are in the cache of this machine."""
     of_series: Sequence[Exchangeable] = ()
     if method.is_series:
-        from mbref.taylor.preparation import KERNELS_OF_SERIES as of_series
+        from mbref.taylor.preparation import kernels_of_series
+
+        of_series = kernels_of_series(scene)
     return all(kernel.is_kept for kernel in (*preparation.kernels_of(method), *of_series))
 
 
@@ -222,7 +225,7 @@ def why_no_code(scene: Scene, method: Method) -> str:
 
     The kernels of the method are compiled.
     """
-    prepare(method)
+    prepare(method, scene)
     try:
         start_run(scene, method, np.array([scene.duration]), Limits(code=GENERATED))
     except NoGeneratedCode as reason:

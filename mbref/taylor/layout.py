@@ -148,9 +148,9 @@ class SeriesKernels(NamedTuple):
     """The kernels that several others call by address, so that each is compiled once. Neighbours call common
     helpers."""
 
+    orders: Annotated[Kernel, TERMS]
     balance: Annotated[Kernel, BALANCE]
     sample: Annotated[Kernel, SAMPLE]
-    loads: Annotated[Kernel, TERMS]
     multipliers: Annotated[Kernel, TERMS]
     terms: Annotated[Kernel, TERMS]
     correct: Annotated[Kernel, CORRECT]

@@ -39,9 +39,6 @@ def varies(polynomials: Any) -> bool:
     return loads + polynomials.slides.damping.shape[0] + polynomials.timed.function.shape[0] > 0
 
 
-has_varying_loads = inlined(varies)  # for kernels; Python calls ``varies``, which needs no compilation
-
-
 @inlined
 def applied_order(amount, function, k, factors):
     """Return order k of a force or torque that a function of time multiplies, or that is constant."""

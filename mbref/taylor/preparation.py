@@ -1,16 +1,19 @@
 """Preparation of the series: its kernels, compiled or loaded before the clock of a run starts.
 
 Two processes share the work: one begins with the first kernel, the other one with the last kernel. Neighbours
-call common helpers, which each process compiles for itself. The first run whose motion drivers prescribe
-compiles ``driven.follow_drivers``, which takes long.
+call common helpers, which each process compiles for itself. Scenes without loads and couplings need no
+``series.expand_with_loads``. The first run whose motion drivers prescribe compiles ``driven.follow_drivers``.
+Both take long.
 """
 
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 
-from mbref.kernels.compilation import prepare_all
+from mbref.kernels.compilation import Exchangeable, prepare_all
 from mbref.method import SERIES_METHOD
+from mbref.scene import Scene
 from mbref.taylor.crossing.steps_across import (
     begin_crossing,
     continue_crossing,
@@ -19,6 +22,7 @@ from mbref.taylor.crossing.steps_across import (
     put_state_along,
 )
 from mbref.taylor.sample_completion import complete_samples
+from mbref.taylor.series import expand_with_loads, expand_without_loads
 from mbref.taylor.series_memory import CALLED
 from mbref.taylor.stepping import advance_series, enter_series
 
@@ -27,15 +31,25 @@ FROM_PYTHON = (
     cross_position, advance_series,
 )  # fmt: skip
 MIDDLE = len(CALLED) // 2
-KERNELS_OF_SERIES = *CALLED[:MIDDLE], *FROM_PYTHON, *CALLED[MIDDLE:]
+IN_EVERY_RUN = *CALLED[:MIDDLE], *FROM_PYTHON, *CALLED[MIDDLE:], expand_without_loads
+
+
+def kernels_of_series(scene: Scene | None = None) -> tuple[Exchangeable, ...]:
+    """Return the kernels that runs of a scene, or of every scene, call."""
+    varies = scene is None or scene.load or scene.coupling
+    return (expand_with_loads, *IN_EVERY_RUN) if varies else IN_EVERY_RUN
+
+
+def prepare_series(scene: Scene | None = None) -> None:
+    """Compile the kernels of the series, or load them from the cache of this machine."""
+    _prepare(kernels_of_series(scene))
 
 
 @functools.cache
-def prepare_series() -> None:
-    """Compile the kernels of the series, or load them from the cache of this machine."""
-    prepare_all(KERNELS_OF_SERIES, SERIES_METHOD)
+def _prepare(kernels: Sequence[Exchangeable]) -> None:
+    prepare_all(kernels, SERIES_METHOD)
 
 
 def prepare_series_backwards() -> None:
-    """Compile or load the kernels of the series, from the last one to the first one."""
-    prepare_all(KERNELS_OF_SERIES[::-1], SERIES_METHOD)
+    """Compile or load the kernels of every run, from the last one to the first one."""
+    prepare_all(IN_EVERY_RUN[::-1], SERIES_METHOD)

@@ -8,13 +8,13 @@ is added to the sums of all later orders at once, so that few operations separat
 
 from __future__ import annotations
 
-from mbref.kernels.compilation import exchangeable, inlined, kernel
+from mbref.kernels.compilation import exchangeable, inlined
 from mbref.kernels.layout import OK
 from mbref.taylor.coefficients import largest_coefficient
 from mbref.taylor.generated_calls import expand_by_code, expand_by_power
 from mbref.taylor.joint_loads import add_slides, add_torsions, grow_slides, grow_torsions
 from mbref.taylor.layout import TERMS
-from mbref.taylor.loads import add_springs, add_timed_forces, grow_springs, has_varying_loads
+from mbref.taylor.loads import add_springs, add_timed_forces, grow_springs
 from mbref.taylor.simd import WIDTH, gather, load, store
 from mbref.taylor.solver import solution
 
@@ -95,11 +95,13 @@ def solve_order(k, last, memory):
         add_to_later_sums(k, last, memory)
 
 
-@kernel
-def expand_without_loads(last, memory):
-    """Compute orders 0 … last with constant loads only, by code short enough for the registers."""
+@exchangeable(TERMS)
+def expand_without_loads(memory):
+    """Compute all orders with constant loads only, by code short enough for the registers; return OK."""
+    last = memory.mode.order - 2
     for k in range(last + 1):
         solve_order(k, last, memory)
+    return OK
 
 
 @exchangeable(TERMS)
@@ -174,7 +176,4 @@ def expand_with_multipliers(memory):
         )  # fmt: skip
         return OK
     start_sums(memory)
-    if has_varying_loads(memory.polynomials):
-        return memory.kernels.loads(memory)
-    expand_without_loads(memory.mode.order - 2, memory)
-    return OK
+    return memory.kernels.orders(memory)

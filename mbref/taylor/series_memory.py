@@ -17,18 +17,24 @@ from mbref.taylor.crossing.determinants import evaluate_gradient, gradient_deter
 from mbref.taylor.crossing.start import judge_start
 from mbref.taylor.crossing.steps_across import record_crossings
 from mbref.taylor.layout import Series, SeriesKernels, TaylorMemory
+from mbref.taylor.loads import varies
 from mbref.taylor.polynomial_layout import Polynomials
 from mbref.taylor.polynomials import Geometry
 from mbref.taylor.sample_completion import balance_forces, complete_sample
-from mbref.taylor.series import expand_series, expand_with_loads, expand_with_multipliers
+from mbref.taylor.series import (
+    expand_series,
+    expand_with_loads,
+    expand_with_multipliers,
+    expand_without_loads,
+)
 from mbref.taylor.simd import padded_size
 from mbref.taylor.solver import respond_in_loops
 from mbref.taylor.step_start import choose, choose_partition, return_to_start
 from mbref.taylor.stepping import begin_series, expand_from, save_series_without_pole, take_step
 
 KEPT = 16  # singular positions that a call can record
-CALLED = (  # the SeriesKernels
-    balance_forces, complete_sample, expand_with_loads, expand_with_multipliers, expand_series, correct_state,
+CALLED = (  # the SeriesKernels after ``orders``
+    balance_forces, complete_sample, expand_with_multipliers, expand_series, correct_state,
     expand_from, respond_in_loops, choose_partition, choose, return_to_start, save_series_without_pole,
     record_crossings, judge_start, begin_series, evaluate_gradient, gradient_determinant,
     contains_singular_position, pivot_at_turning_point, take_step,
@@ -59,12 +65,13 @@ def _allocate(
     run: Run, geometry: Geometry, polynomials: Polynomials, sizes: Mapping[str, int]
 ) -> TaylorMemory:
     """Return memory of the series without the numbers of a run."""
-    orders, nz, nr = sizes["orders"], sizes["nz"], sizes["nr"]
+    count, nz, nr = sizes["orders"], sizes["nz"], sizes["nr"]
     series = allocate(Series, sizes)
-    grown = np.arange(1.0, orders + 1) * np.arange(2.0, orders + 2)
+    grown = np.arange(1.0, count + 1) * np.arange(2.0, count + 2)
     series.scale[:, :nz], series.scale[:, nz : nz + nr] = -1.0 / grown[:, None], -1.0
     series.growth[:], series.growth[:, nz : nz + nr] = 1.0, grown[:, None]
     series.variable[:nz] = 1.0
+    orders = expand_with_loads if varies(polynomials) else expand_without_loads
     switches = [k for k, taken in dict(run.limits.branches).items() if taken != SMOOTH]
     return allocate(
         TaylorMemory,
@@ -73,7 +80,7 @@ def _allocate(
         polynomials=copied(polynomials),
         pose_maps=copied(geometry.pose_maps),
         series=series,
-        kernels=SeriesKernels(*(kernel.pointer for kernel in CALLED)),
+        kernels=SeriesKernels(*(kernel.pointer for kernel in (orders, *CALLED))),
         branch_switches=np.array(switches, np.int64),
     )
 
