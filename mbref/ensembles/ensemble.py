@@ -28,6 +28,7 @@ from mbref.ensembles.simulate_all import Ended, run_all
 from mbref.method import Method, crossing_method
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
+from mbref.scenes import find_scene
 from mbref.simulation import VERSION
 from mbref.simulation.simulate import Limits, checked_times, prepare
 
@@ -40,7 +41,7 @@ MOST_AT_ONCE, SECONDS = 512, 0.25
 
 
 def ensemble(
-    scenes: Iterable[Scene],
+    scenes: Iterable[Scene | str | Path],
     times: Sequence[float] | np.ndarray,
     method: str | None = None,
     limits: Limits | None = None,
@@ -54,8 +55,8 @@ def ensemble(
 
     Parameters
     ----------
-    scenes : iterable of Scene
-        The scenes. A generator is read a few scenes ahead of the results.
+    scenes : iterable of Scene, str or path
+        Scenes, names of built-in ones, or .toml files. A generator is read a few scenes ahead of the results.
     times : sequence of float or ndarray, shape (k,)
         Increasing sample times, s, as for ``simulate``.
     method : str, optional
@@ -84,21 +85,21 @@ def ensemble(
         If the file cannot be read or written.
     """
     limits, times = limits or Limits(), checked_times(times)
+    found: Iterator[Scene] = map(find_scene, scenes)
     if method is None:
-        scenes = iter(scenes)
-        first = next(scenes, None)
+        first = next(found, None)
         if first is None:
             return
-        method, scenes = crossing_method(first), itertools.chain([first], scenes)
+        method, found = crossing_method(first), itertools.chain([first], found)
     if executor is None:
         with processes() as pool:
-            yield from ensemble(scenes, times, method, limits, pool, path)
+            yield from ensemble(found, times, method, limits, pool, path)
         return
     known = records.opened(path)  # raises for a faulty file before anything is compiled or run
     prepare(Method.parse(method))  # once, not in every process at the same time
     work = Work(executor, method, times, limits)
     try:
-        for place, scene in enumerate(scenes):
+        for place, scene in enumerate(found):
             key = _key(scene, times, method, limits) if path else ""
             if key in known:
                 yield place, _stored(path, scene, times, known[key])
