@@ -116,7 +116,7 @@ def turning(scene: Scene) -> Turning:
     if not moving:
         return Turning(np.zeros(3), np.zeros(3), "")
     driver, joint = moving[0], scene.joint_named(moving[0].joint)
-    is_constant = driver.sine is None and driver.table is None and not any(driver.polynomial[2:])
+    is_constant = driver.is_polynomial and not any(driver.polynomial[2:])
     if len(moving) > 1 or not is_constant or joint.facts.driven != "angle" or GROUND not in joint.bodies:
         raise SceneError(
             [

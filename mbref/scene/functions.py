@@ -173,8 +173,13 @@ class TimeFunction(SceneEntry):
     @property
     def is_constant(self) -> bool:
         """True if the value never changes."""
-        still = self.sine is None or self.sine.amplitude == 0.0
-        return still and not any(self.coefficients[1:]) and self.table is None and len(self.pieces()) == 1
+        return self.is_polynomial and not any(self.coefficients[1:]) and len(self.pieces()) == 1
+
+    @property
+    def is_polynomial(self) -> bool:
+        """True without a table and a sine that moves."""
+        still = self.sine is None or not self.sine.amplitude or not self.sine.frequency
+        return still and self.table is None
 
 
 def _closed(table: tuple[Row, ...]) -> tuple[Row, ...]:

@@ -54,7 +54,7 @@ def turning(scene: Scene) -> Turning:
     name = moving[0].joint
     joint, frames = scene.joint_named(name), next(j for j in joint_frames(scene) if j.name == name)
     rates = moving[0].polynomial[1:]
-    is_steady = len(moving) == 1 and moving[0].sine is None and moving[0].table is None and not any(rates[1:])
+    is_steady = len(moving) == 1 and moving[0].is_polynomial and not any(rates[1:])
     if not is_steady or frames.slides or GROUND not in joint.bodies:
         raise SceneError(
             [

@@ -19,7 +19,7 @@ def turning_pendulum(rate: float, axis=(0.0, 0.0, 1.0), **changes) -> Scene:
     """Return a ball on an arm of 0.5 m that hangs from a turning spindle by a hinge about the y axis."""
     bodies = [rod("spindle", ORIGIN, 1.0, 0.1), rod("ball", (0.3, 0.0, -0.4), MASS, OWN)]
     joints = [hinge("A", ("ground", "spindle"), axis=axis), hinge("B", ("spindle", "ball"), axis=Y)]
-    driver = [{"joint": "A", "polynomial": [0.0, rate]}]
+    driver = [{"joint": "A", "polynomial": [0.0, rate], "sine": {"frequency": 5.0}}]  # of no amplitude
     given = {"gravity": (0.0, 0.0, -G), "body": bodies, "joint": joints, "driver": driver}
     return Scene(name="turning_pendulum", **given | changes)
 
