@@ -108,7 +108,9 @@ def moved_equilibrium(request: DerivativeRequest, step: float) -> MovedEquilibri
     model, name = request.model, request.scene.name
     start = consistent_start(model)
     if start.v.any():
-        raise InputError(f"{name}: is not at rest; {FIND_EQUILIBRIUM}")
+        moving = next((driver.joint for driver in request.scene.driver if not driver.is_constant), None)
+        why = f"the driver of {moving!r} moves it" if moving else FIND_EQUILIBRIUM
+        raise InputError(f"{name}: is not at rest; {why}")
     state = state_at_rest(model, start.q)
     rows = TangentRows(model, state, partition_of(model, state))
     driven = np.abs(rows.placed(rows.terms.gamma[..., None])).max(initial=0.0) * request.scene.duration**2
