@@ -1,9 +1,8 @@
-"""Motion: a trajectory together with its scene, from which joint motions, energies, tables, files and
-pictures follow."""
+"""Motion: a trajectory and its scene, from which joint motions, energies, tables and pictures follow."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mbref.motions.actuation import DriverMotion, LoadMotion, driver_motion, largest_force, load_motion
+from mbref.motions.body_order import fields_in_order
 from mbref.motions.constraints import Violation, determined_reactions, violations
 from mbref.motions.drawing.picture import moving, still
 from mbref.motions.drawing.plot import plot
@@ -55,9 +55,9 @@ class Motion(Trajectory):
         scene : Scene
             The scene that moves.
         trajectory : Trajectory
-            Its motion, with the bodies in any order.
+            Its motion, with the bodies in any order; the result has the scene's order.
         """
-        return Motion(**{f.name: getattr(trajectory, f.name) for f in fields(Trajectory)}, mechanism=scene)
+        return Motion(**fields_in_order(scene, trajectory), mechanism=scene)
 
     def joint(self, name: str) -> JointMotion:
         """Return angle (rad), displacement (m), their rates and the reaction (N, N m) of one joint.

@@ -89,8 +89,7 @@ def test_polynomial_that_holds_for_a_while_has_the_slope_of_all_turns(lead):
     slopes = P.deriv()(q[:2])
     reduced = INERTIA["A"] + slopes**2 * INERTIA["B"]
     wanted = INERTIA["A"] * SPEED / np.sqrt(reduced[0] * reduced[[0, 1, 1]])
-    assert np.abs(rate - wanted).max() <= TOLERANCE
-    assert np.abs(follower - slopes[[0, 1, 1]] * wanted).max() <= TOLERANCE
+    assert np.abs([rate - wanted, follower - slopes[[0, 1, 1]] * wanted]).max() <= TOLERANCE
 
 
 def test_formulations_of_the_judge_agree_with_mbref_over_full_turns():
