@@ -12,11 +12,11 @@ from crosscheck.judge.loads import attachment
 from crosscheck.judge.time_functions import value
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import JointLoad, Scene, Spring
+from mbref.scene import Force, JointLoad, Moment, Scene, SlideSpring, Spring, TorsionSpring
 from mbref.scene.joints import ANGLE
 
 ENERGIES = ("kinetic_energy", "potential_energy", "energy")
-SPRING = ("length", "length_rate", "force", "power")
+SPRING = ("length", "length_rate", "force", "power", "energy")
 TURNING = ("angle", "rate", "torque", "power")
 SLIDING = ("displacement", "displacement_rate", "force", "power")
 
@@ -36,8 +36,9 @@ def action_names(scene: Scene) -> list[str]:
 
 def _kinds(load: object) -> tuple[str, ...]:
     if isinstance(load, JointLoad):
-        return TURNING if load.coordinate == ANGLE else SLIDING
-    return SPRING if isinstance(load, Spring) else ()
+        kinds = TURNING if load.coordinate == ANGLE else SLIDING
+        return (*kinds, "energy") if isinstance(load, TorsionSpring | SlideSpring) else kinds
+    return SPRING if isinstance(load, Spring) else ("power",)
 
 
 def actions(scene: Scene, motion: Trajectory, moved: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -48,11 +49,12 @@ def actions(scene: Scene, motion: Trajectory, moved: Mapping[str, np.ndarray]) -
     """
     found: dict[str, np.ndarray] = {}
     for place, load in enumerate(scene.load):
-        numbers: tuple[np.ndarray, ...] = ()
         if isinstance(load, JointLoad):
             numbers = _of_joint(load, motion.times, moved)
         elif isinstance(load, Spring):
             numbers = _of_spring(scene, load, motion)
+        else:
+            numbers = (_power(scene, load, motion),)
         found.update(zip((f"load({place}).{kind}" for kind in _kinds(load)), numbers, strict=True))
     if scene.has_mass():
         found.update(_energies(scene, motion, moved))
@@ -62,22 +64,39 @@ def actions(scene: Scene, motion: Trajectory, moved: Mapping[str, np.ndarray]) -
 
 
 def _of_joint(load: JointLoad, times: np.ndarray, moved: Mapping[str, np.ndarray]) -> tuple[np.ndarray, ...]:
-    """Return coordinate, rate, force or torque on the second body, and power into the bodies (k,)."""
+    """Return coordinate, rate, force or torque on the second body, and power into the bodies (k,); of a
+    spring also its energy."""
     q, rate = (moved[f"{load.joint}.{kind}"] for kind in _kinds(load)[:2])
     action = load.action
-    factor = 1.0 if load.over_time is None else value(load.over_time, times)
-    push = action.amount * factor - action.stiffness * (q - action.natural) - action.damping * rate
-    return q, rate, push, push * rate
+    stretch = q - action.natural
+    push = action.amount * _factor(load, times) - action.stiffness * stretch - action.damping * rate
+    energy = (action.stiffness * stretch**2 / 2,) if "energy" in _kinds(load) else ()
+    return q, rate, push, push * rate, *energy
+
+
+def _factor(load: Force | Moment | JointLoad, times: np.ndarray) -> np.ndarray:
+    """Return the factor (k,) of a load at times (k,), s."""
+    return np.ones(len(times)) if load.over_time is None else value(load.over_time, times)
+
+
+def _power(scene: Scene, load: Force | Moment, motion: Trajectory) -> np.ndarray:
+    """Return the power (k,) of a force or a moment on a body, W."""
+    if isinstance(load, Force):
+        rate, action = _end(scene, load.body, load.point, motion)[1], load.force
+    else:
+        rate, action = motion.angular_velocity[:, scene.body_index(load.body)], load.moment
+    return np.asarray(_factor(load, motion.times) * (rate @ np.array(action)))
 
 
 def _of_spring(scene: Scene, load: Spring, motion: Trajectory) -> tuple[np.ndarray, ...]:
-    """Return length, its rate, pull, and power into the bodies (k,)."""
+    """Return length, its rate, pull, power into the bodies, and energy (k,)."""
     ends = [_end(scene, name, point, motion) for name, point in zip(load.bodies, load.points, strict=True)]
     offset, rate = (second - first for first, second in zip(*ends, strict=True))
     length = np.linalg.norm(offset, axis=1)
     along = np.sum(offset * rate, axis=1) / np.where(length > 0, length, 1.0)
-    pull = load.stiffness * (length - load.natural_length) + load.damping * along
-    return length, along, pull, -pull * along
+    stretch = length - load.natural_length
+    pull = load.stiffness * stretch + load.damping * along
+    return length, along, pull, -pull * along, load.stiffness * stretch**2 / 2
 
 
 def _end(
