@@ -1,7 +1,8 @@
-"""Output files: written beside and renamed, so that a failure leaves no part of a file; names of files."""
+"""Files: written beside and renamed, so that a failure leaves no part of a file; read up to a size; names."""
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import secrets
@@ -14,6 +15,7 @@ from pathlib import Path
 from mbref.input_error import InputError
 
 LONGEST_NAME = 80  # bytes of a file name that is made from a name; file systems allow 255
+LARGEST_FILE = 1 << 30  # bytes that are read; a device such as /dev/zero has no end
 SPECIAL = ("/dev/", "/proc/")  # beginnings of paths that lead to devices and open files
 
 
@@ -24,6 +26,15 @@ def write(path: str | Path, content: str | bytes) -> None:
     """
     with replaced(path) as fresh:
         fresh.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+def content(path: str | Path) -> bytes:
+    """Return the bytes of a file; raises OSError, also for a file or device of more than 1 GiB."""
+    with open(path, "rb") as file:
+        found = file.read(LARGEST_FILE + 1)
+    if len(found) > LARGEST_FILE:
+        raise OSError(errno.EFBIG, os.strerror(errno.EFBIG), str(path))
+    return found
 
 
 @contextmanager

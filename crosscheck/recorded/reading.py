@@ -15,6 +15,7 @@ import numpy as np
 
 from crosscheck.recorded.columns import SI, kind_of, names
 from crosscheck.recorded.number_formats import half_units, number
+from mbref.files import content
 from mbref.scene import Scene, SceneError
 from mbref.scene.units import ATOMS, Unit, unit
 
@@ -93,7 +94,7 @@ def _digits(numbers: np.ndarray, halves: np.ndarray) -> int:
 
 def _cells(path: Path) -> tuple[list[str], list[list[str]]]:
     """Return headers and cells of a table; the first line whose first cell is a number is the first row."""
-    data = path.read_bytes()
+    data = content(path)
     is_wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     text = data.decode("utf-16" if is_wide else "utf-8-sig", errors="replace")
     lines = [line.strip() for line in text.splitlines() if line.strip()]

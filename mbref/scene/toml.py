@@ -10,6 +10,7 @@ from typing import Any
 
 import tomli_w
 
+from mbref.files import content
 from mbref.scene.validation import SceneError
 
 TABLE = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]\]?")
@@ -27,7 +28,7 @@ Line = tuple[int, str, int, str]  # number from 1, table, index in the table, ke
 def read_toml(path: str | Path) -> tuple[str, dict[str, Any]]:
     """Return the text of a TOML file (UTF-8) and its tables; raises SceneError that names the file."""
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
+        text = content(path).decode("utf-8-sig")
         data = tomllib.loads(text)
     except OSError as error:
         raise SceneError([f"{path}: cannot be read: {error.strerror}"]) from None

@@ -12,6 +12,7 @@ from crosscheck.engines.sdf.elements import is_true
 from crosscheck.engines.sdf.flattening import IN_MODEL
 from crosscheck.engines.shared import xml_files
 from crosscheck.engines.shared.xml_files import DEEPEST
+from mbref.files import content
 from mbref.scene import SceneError
 
 VARIABLES = ("SDF_PATH", "GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH")
@@ -96,7 +97,7 @@ def _included(include: ET.Element, files: tuple[Path, ...], depth: int) -> ET.El
     path = _file_of(uri, files[-1].parent)
     if path in files:
         raise SceneError([f"include {uri!r}: {path} includes itself"])
-    root = xml_files.parsed_bytes(path.read_bytes(), f"include {uri!r}: {path}")
+    root = xml_files.parsed_bytes(content(path), f"include {uri!r}: {path}")
     model = root.find("model")
     if model is None:
         raise SceneError([f"include {uri!r}: {path} has no model"])

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mbref.files import content
 from mbref.scene import SceneError
 
 DEEPEST = 200  # elements inside each other; robots need about ten, and Python's recursion ends near 1000
@@ -26,7 +27,7 @@ ROUNDED = 1e-9  # relative excess of the largest moment of inertia: the rounding
 def parsed(path: Path) -> ET.Element:
     """Return the root element of an XML file; raises SceneError for a file that is no XML or is nested too
     deeply, OSError."""
-    return parsed_bytes(path.read_bytes(), str(path))
+    return parsed_bytes(content(path), str(path))
 
 
 def parsed_bytes(text: bytes, where: str) -> ET.Element:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mbref.files import content
 from mbref.input_error import InputError
 
 NumberTable = Mapping[str, np.ndarray] | str | Path
@@ -32,8 +33,7 @@ def columns_of_numbers(given: NumberTable, what: str) -> dict[str, np.ndarray]:
 def _read(path: str | Path) -> dict[str, np.ndarray]:
     """Return the columns of a CSV file with a line of their names: with commas between numbers, or with ``;``
     and decimal commas or points."""
-    with open(path, encoding="utf-8-sig", newline="") as file:
-        lines = [line for line in file.read().splitlines() if line.strip()]
+    lines = [line for line in content(path).decode("utf-8-sig").splitlines() if line.strip()]
     mark = ";" if lines and ";" in lines[0] else ","
     names, *rows = [*csv.reader(lines, delimiter=mark)] or [[]]
     names = [name.strip() for name in names]

@@ -12,6 +12,7 @@ import numpy as np
 from crosscheck.engines.mujoco.importing.closures import TYPES, Closure, Frame, of_site
 from crosscheck.engines.mujoco.importing.groups import WORLD, Groups
 from crosscheck.engines.shared.geometry import joint_frame
+from mbref.files import content
 from mbref.scene import GROUND, SceneError
 
 AXES = dict(zip("xyz", np.eye(3), strict=True))
@@ -91,7 +92,7 @@ def _of_yaml(path: Path, frames: Frames) -> Iterator[Closure]:
     except ImportError:
         raise SceneError([f"{path}: reading YAML needs pip install pyyaml"]) from None
     try:
-        found = yaml.safe_load(path.read_text(encoding="utf-8"))
+        found = yaml.safe_load(content(path).decode())
     except yaml.YAMLError as error:
         raise SceneError([f"{path}: is no YAML: {' '.join(str(error).split())}"]) from None
     pairs = found.get("closed_loop") if isinstance(found, dict) else None

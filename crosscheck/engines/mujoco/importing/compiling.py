@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engines.mujoco.importing import holding, urdf
+from mbref.files import content
 from mbref.formats import ImportOptions
 from mbref.scene import GROUND, SceneError
 
@@ -19,10 +20,10 @@ def compiled(mujoco: Any, path: Path, options: ImportOptions) -> tuple[Any, urdf
     """Return the compiled model, the text of a URDF, and notes."""
     try:
         if path.suffix != ".urdf":
-            path.read_bytes()  # raises OSError for a missing file, which MuJoCo does not
+            content(path)  # raises OSError for a missing file, which MuJoCo does not
             model, notes = holding.compiled(mujoco, path, options.hold, options.keyframe)
             return model, None, notes
-        text = urdf.prepared(path.read_bytes(), options.hold, str(path))
+        text = urdf.prepared(content(path), options.hold, str(path))
         model = mujoco.MjModel.from_xml_string(text.text)
     except ValueError as error:
         said = " ".join(str(error).split())
