@@ -13,6 +13,7 @@ import tomli_w
 from mbref.files import content
 from mbref.scene.validation import SceneError
 
+NEWLINE = re.compile(r"\r\n?")  # TOML has no line that ends with \r alone; some editors do
 TABLE = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]\]?")
 KEY = re.compile(r"\s*([\w-]+|\"[^\"]*\")\s*=")
 NAME = re.compile(r"\s*(?:name|joint)\s*=\s*[\"']([^\"']*)[\"']")
@@ -28,7 +29,7 @@ Line = tuple[int, str, int, str]  # number from 1, table, index in the table, ke
 def read_toml(path: str | Path) -> tuple[str, dict[str, Any]]:
     """Return the text of a TOML file (UTF-8) and its tables; raises SceneError that names the file."""
     try:
-        text = content(path).decode("utf-8-sig")
+        text = NEWLINE.sub("\n", content(path).decode("utf-8-sig"))
         data = tomllib.loads(text)
     except OSError as error:
         raise SceneError([f"{path}: cannot be read: {error.strerror}"]) from None
