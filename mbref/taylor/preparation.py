@@ -9,7 +9,6 @@ Both take long.
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
 
 from mbref.kernels.compilation import Exchangeable, prepare_all
 from mbref.method import SERIES_METHOD
@@ -36,18 +35,27 @@ IN_EVERY_RUN = *CALLED[:MIDDLE], *FROM_PYTHON, *CALLED[MIDDLE:], expand_without_
 
 def kernels_of_series(scene: Scene | None = None) -> tuple[Exchangeable, ...]:
     """Return the kernels that runs of a scene, or of every scene, call."""
-    varies = scene is None or scene.load or scene.coupling
-    return (expand_with_loads, *IN_EVERY_RUN) if varies else IN_EVERY_RUN
+    return _kernels(_may_vary(scene))
 
 
 def prepare_series(scene: Scene | None = None) -> None:
     """Compile the kernels of the series, or load them from the cache of this machine."""
-    _prepare(kernels_of_series(scene))
+    _prepare(_may_vary(scene))
+
+
+def _may_vary(scene: Scene | None) -> bool:
+    """Return whether a scene, or any scene, may have loads that vary."""
+    return scene is None or bool(scene.load or scene.coupling)
+
+
+def _kernels(has_loads: bool) -> tuple[Exchangeable, ...]:
+    return (expand_with_loads, *IN_EVERY_RUN) if has_loads else IN_EVERY_RUN
 
 
 @functools.cache
-def _prepare(kernels: Sequence[Exchangeable]) -> None:
-    prepare_all(kernels, SERIES_METHOD)
+def _prepare(has_loads: bool) -> None:
+    """Prepare the kernels once: each run asks for them, and a flag is compared faster than all kernels."""
+    prepare_all(_kernels(has_loads), SERIES_METHOD)
 
 
 def prepare_series_backwards() -> None:

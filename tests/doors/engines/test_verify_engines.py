@@ -63,7 +63,7 @@ def test_built_in_engine_violates_no_check_on_six_probes(name):
     ],
 )
 def test_built_in_engine_violates_only_known_checks_of_couplings_relations_and_laws(name, scenes, related):
-    """KNOWN lists checks that fail, and why: each of them fails, and no other check does."""
+    """Every check that KNOWN lists fails. No other check fails."""
     found = [verdict for scene in scenes for verdict in verdicts(name, scene, related)]
     failed = {(name, each.scene, each.property): each for each in found if each.status == "fail"}
     assert set(failed) == known(name, scenes), failed
