@@ -11,10 +11,8 @@ from crosscheck.judge.equations_of_motion import accelerations as of_terms
 from crosscheck.judge.equations_of_motion import terms_at
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.joint_residuals import joint_frames, position_rows, with_ground
-from mbref.scene import Body, Driver, Force, Moment, Revolute, Scene, TorsionSpring
+from mbref.scene import Body, Driver, Force, Revolute, Scene, TorsionSpring
 from tests.helpers.parts import X, Y, Z, joint
-
-GROUND_B = ("ground", "b")
 
 
 def body(name: str = "b", **parts: object) -> Body:
@@ -35,33 +33,6 @@ def test_a_table_of_a_driver_is_joined_by_scipys_cubic_spline(derivative, rows):
     t = np.array([0.01, 0.15, 0.3, 0.45, 0.5, 0.7, rows[-1][0] - 0.01])
     assert time_functions.value(law, t, derivative) == pytest.approx(spline(t, derivative), abs=1e-11)
     assert time_functions.ends(law) == tuple(time for time, _ in rows[1:-1])
-
-
-FACTOR = {"polynomial": [1.0, 2.0], "start": 0.4, "stop": 0.8}  # 1 + 2 t from 0.4 to 0.8 s, otherwise 0
-
-
-def test_pieces_of_a_scenes_functions_end_at_rows_of_tables_and_at_start_and_stop():
-    """``next_end`` is the first end of a piece after a time. The scene has a driver's table with inner rows
-    at 0.3, 0.5 and 0.9 s, a moment with FACTOR from 0.4 to 0.8 s, and a constant moment, which has no end."""
-    scene = Scene(
-        name="s",
-        body=(body(),),
-        joint=(Revolute(name="J", bodies=GROUND_B, anchor=(0.0, 0.0, 0.0), axis=Z),),
-        driver=(Driver(joint="J", table=TABLE),),
-        load=(Moment(body="b", moment=X, factor=FACTOR), Moment(body="b", moment=Y)),
-    )
-    ends = [time_functions.next_end(scene, t) for t in (0.0, 0.3, 0.4, 0.5, 0.85)]
-    assert ends == [0.3, 0.4, 0.5, 0.8, 0.9]
-    assert time_functions.next_end(scene, 0.9) == math.inf
-
-
-def test_factor_is_zero_outside_its_piece_and_has_the_piece_s_value_at_its_end():
-    """1 + 2 t is 1.8 at 0.4 s, 2.58 at 0.79 s and 2.6 at 0.8 s, where the piece from 0.4 s ends. From 0.8 s
-    on the factor is 0. With ``since`` 0.4 the function returns the value of the piece at its end."""
-    factor = Moment(body="b", moment=X, factor=FACTOR).factor
-    t = np.array([0.39, 0.4, 0.79, 0.8, 1.0])
-    assert time_functions.value(factor, t) == pytest.approx([0.0, 1.8, 2.58, 0.0, 0.0])
-    assert time_functions.value(factor, 0.8, since=0.4) == pytest.approx(2.6)
 
 
 def residual(given: dict, place, q) -> list[float]:

@@ -11,12 +11,11 @@ from crosscheck.conformance.suite import FAIL, Verdict
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.momentum import momentum_series
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import Body, Distance, Force, Moment, Revolute, Scene, Spherical
+from mbref.scene import Body, Force, Moment, Revolute, Scene, Spherical
 from tests.helpers.parts import spring
 
 FIRST = Body(name="a", mass=2.0, inertia=(1.0, 1.0, 2.0), position=(0.0, 0.0, 0.0), velocity=(3.0, 0.0, 0.0))
 SECOND = Body(name="b", mass=4, inertia=(3, 3, 5), position=(3, 0, 0), angular_velocity=(0, 0, 2))
-PIN = Distance(name="D", bodies=("a", "b"), anchors=((0.0, 0.0, 0.0), (3.0, 0.0, 0.0)))
 SCENE = Scene(name="free", body=(FIRST, SECOND), duration=1.0)
 TIMES = np.array([0.0, 0.5, 1.0])
 ROUNDED = 1e-15  # of momentum, relative: exact sums of few numbers
@@ -40,17 +39,6 @@ def test_angular_momentum_drift_is_relative_to_spin_and_linear_momentum():
     run.angular_velocity[1, 1, 2] += 0.7
     found = momentum_series(SCENE, run)
     assert found[1] == pytest.approx(3.5 / (13.5 + 6.0 * scene_length(SCENE))) and found[2] < ROUNDED
-
-
-def test_momentum_drift_of_turning_in_place_is_relative_to_the_spin():
-    """Body a rests, body b turns: 5 kg m² at 2 rad/s gain 1 rad/s, which is 5 of the largest spin, 15 N m s.
-    Without the gain the drift is rounding."""
-    turning = SCENE.with_(body=(FIRST.model_copy(update={"velocity": None}), SECOND), joint=(PIN,))
-    run = motion()
-    run.position[:, 0, 0], run.velocity[:] = 0.0, 0.0
-    assert momentum_series(turning, run).max() < ROUNDED
-    run.angular_velocity[2, 1, 2] += 1.0
-    assert momentum_series(turning, run)[2] == pytest.approx(5.0 / 15.0)
 
 
 def test_impulses_of_gravity_forces_and_moments_are_no_drift():
@@ -88,10 +76,13 @@ def test_scene_without_a_momentum_balance_has_no_drift(change):
 
 
 def test_run_at_rest_has_no_momentum_drift():
-    """No momentum of the motion could be the scale: None stands for no drift. Moving bodies have one."""
+    """No momentum of the motion could be the scale: None stands for no drift. Moving bodies have one, also
+    where they turn in place, without linear momentum."""
     assert momentum_series(SCENE, motion()) is not None
     run = motion()
-    run.velocity[:], run.angular_velocity[:] = 0.0, 0.0
+    run.velocity[:] = 0.0
+    assert np.isfinite(momentum_series(SCENE, run)).all()
+    run.angular_velocity[:] = 0.0
     assert momentum_series(SCENE, run) is None
 
 

@@ -246,15 +246,6 @@ def test_certify_writes_its_table_and_prints_the_progress_of_both_formulations(c
         assert f"formulation {name}: 100 of 100" in err and "t = 0.002 s" in err, err
 
 
-def test_option_with_one_setting_runs_it_once_without_a_sweep(capsys, still):
-    """A sweep would print "looking for settings" and give two records."""
-    asked = ("--engine", FAKE, "--setting", "plain", "--option", "seconds=0.125", "--json")
-    status, out, err = run_main(capsys, "run", still, *asked)
-    [record] = json.loads(out)["records"]
-    assert status == 0 and record["settings"] == {"seconds": 0.125}, (err, record)
-    assert "looking for settings" not in err, err
-
-
 def test_printed_command_of_a_record_repeats_its_run(capsys, still):
     """Two records have other samples, options and outcomes; 1/3 needs all digits of a double."""
     scene = Scene.from_file(still).with_(duration=0.3)

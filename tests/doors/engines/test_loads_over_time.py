@@ -114,9 +114,10 @@ def test_hinge_with_a_load_keeps_its_coordinate_when_a_loop_is_cut():
 
 @pytest.mark.parametrize(("of", "kind"), [("pinocchio", "sine"), ("exudyn", "table"), ("exudyn", "switched")])
 def test_adapter_refuses_a_function_of_time_that_it_does_not_map(of, kind):
-    """Pinocchio's adapter maps none, Exudyn's only polynomials. The refusal names the load."""
+    """Pinocchio's adapter maps none, Exudyn's only smooth ones. The refusal names the load."""
     refused = engine(of).cannot(PROBES[f"{kind} loads over time"])
     assert refused.owner is Owner.ADAPTER and "load[0]" in refused.reason
+    assert engine("exudyn").cannot(PROBES["sine loads over time"]) is None
 
 
 PLAIN = """<mujoco><option timestep="0.001" integrator="RK4"/><worldbody>
