@@ -81,15 +81,12 @@ def stepped_by_mujoco(model, start, times) -> np.ndarray:
     return np.array(reached)
 
 
-def test_setting_as_in_file_has_the_step_integrator_and_solref_of_the_file(tmp_path):
-    """FOUR_BAR has timestep="0.004", integrator="implicitfast" and, at its closure, solref="0.03 1"."""
-    options = setting_of(imported(tmp_path, FOUR_BAR, TILTED), AS_IN_FILE).options
-    assert (options["step"], options["integrator"], options["solref"]) == (0.004, "implicitfast", "0.03 1")
-
-
 def test_run_as_in_file_equals_steps_of_mujoco_on_its_own_model_of_the_file(tmp_path):
-    """`stepped_by_mujoco` calls mj_step itself, from the pose at which the import has closed the loop."""
+    """`stepped_by_mujoco` calls mj_step itself, from the pose at which the import has closed the loop. The
+    setting states step, integrator and solref of FOUR_BAR."""
     scene = imported(tmp_path, FOUR_BAR, TILTED)
+    options = setting_of(scene, AS_IN_FILE).options
+    assert (options["step"], options["integrator"], options["solref"]) == (0.004, "implicitfast", "0.03 1")
     times = np.array([0.0, 0.04, 0.25, 0.301, 0.4])  # s; 0.25 and 0.301 lie between steps of 0.004
     run = engine("mujoco").run(scene, times, setting_of(scene, AS_IN_FILE))
     start = source(tmp_path / "robot.xml", TILTED).qpos
@@ -216,17 +213,13 @@ def test_a_free_base_is_reported_with_the_option_that_holds_it(tmp_path):
 
 
 def test_hold_fixes_the_base_at_the_pose_of_the_keyframe(tmp_path):
-    """Trunk at (1, 0, 2) m, hip 0.2 m before it with 2 rad/s about y: only the leg is left."""
+    """Trunk at (1, 0, 2) m, hip 0.2 m before it with 2 rad/s about y: only the leg is left, where MuJoCo's
+    model of the file begins, too."""
     fixed = imported(tmp_path, DOG, ImportOptions(hold=["trunk"], keyframe="high"))
     assert not falls_freely(fixed) and [body.name for body in fixed.body] == ["leg"]
     (joint,) = fixed.joint
     assert joint.anchor == pytest.approx((1.2, 0.0, 2.0))
     assert fixed.body[0].angular_velocity == pytest.approx((0.0, 2.0, 0.0))
-
-
-def test_mujocos_model_of_a_file_with_a_held_base_begins_at_the_pose_of_the_scene(tmp_path):
-    """The keyframe "high" has the trunk at (1, 0, 2) m and the leg at 0.3 rad."""
-    fixed = imported(tmp_path, DOG, ImportOptions(hold=["trunk"], keyframe="high"))
     run = engine("mujoco").run(fixed, np.array([0.0, 0.2]), setting_of(fixed, STIFFER_RK4))
     assert run.position[0, 0] == pytest.approx(fixed.body[0].position, abs=ROUNDING)
 

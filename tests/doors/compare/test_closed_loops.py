@@ -68,19 +68,6 @@ def test_cell_has_the_run_of_least_error_and_the_run_of_the_defaults() -> None:
     assert matrix(found)["mujoco"]["Bennett"].best() is None
 
 
-def test_sentence_on_a_run_states_its_setting_and_its_error_or_failure() -> None:
-    """`measured` gives records of MuJoCo's family "tuned" at a step of 1 ms: one with an error of 1e-9, and
-    one that failed with the message of a singular Jacobian."""
-    assert "tuned (step 0.001)" in sentence(measured(1e-9)) and "1e-09" in sentence(measured(1e-9))
-    assert "the Jacobian is singular" in sentence(measured(None, outcome="STEP_FAILED"))
-
-
-def test_command_that_repeats_a_run_names_mechanism_engine_and_setting() -> None:
-    """The mechanism is named by its place in the collection of closed loops."""
-    command = f"crosscheck run {FIRST.place()} --engine mujoco --setting tuned"
-    assert rerun(measured(1e-9)).startswith(command)
-
-
 def test_sentence_on_a_refusal_names_its_reason_and_no_command_repeats_it() -> None:
     """The cell's only record is the refusal by an engine that lacks hinges. It stands for the best run and
     for the defaults; it has no family and no command."""

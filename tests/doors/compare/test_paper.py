@@ -38,10 +38,8 @@ def simulated(label: Label, times: np.ndarray | None = None) -> Trajectory:
         ("0.031c", Outcome.VIOLATION, 0.031 + 1.1 * CLOSE, Match.OTHER_TIME),
         ("0.031c", Outcome.STEP_FAILED, 0.031, Match.DIFFERENT),
         ("0.031c", Outcome.COMPLETED, 20.0, Match.DIFFERENT),
-        ("0.031c", Outcome.TIMED_OUT, 0.031, Match.DIFFERENT),
         ("20", Outcome.COMPLETED, 20.0, Match.SAME),
         ("20", Outcome.VIOLATION, 19.999, Match.DIFFERENT),
-        ("20", Outcome.TIMED_OUT, 20.0, Match.DIFFERENT),
     ],
 )
 def test_run_matches_a_cell_of_the_paper_by_outcome_and_end_time(cell, outcome, t_end, expected):
