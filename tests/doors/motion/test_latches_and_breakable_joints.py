@@ -134,26 +134,6 @@ def test_pendulum_released_by_its_tension_falls_freely(tension):
     assert np.abs(motion.position[-1, 0] - fallen).max() <= ROUNDED and not motion.joint("R").force[-1].any()
 
 
-@pytest.mark.parametrize(
-    ("pull", "release"),
-    [
-        ({"type": "force", "point": ORIGIN, "force": [4.0, 3.0, 0.0]}, {"force": 5.0}),
-        ({"type": "force", "point": ORIGIN, "force": [-5.0, 7.0, 0.0]}, {"force": 5.0, "component": "x"}),
-        ({"type": "force", "point": ORIGIN, "force": [5.0, 0.0, 0.0]}, {"force": "5 N", "component": "-x"}),
-        ({"type": "moment", "moment": [0.0, 0.0, 5.0]}, {"moment": "5 N m"}),
-    ],
-    ids=["size", "x", "-x", "moment"],
-)
-def test_bracket_breaks_where_its_reaction_reaches_the_limit(pull, release):
-    """The reaction is minus the pull: its size, x or minus x is 5 t (N or N m), at the limit at 1 s."""
-    load = {**pull, "body": "a", "factor": {"polynomial": [0.0, 1.0]}}
-    bracket = joint("B", "fixed", "ground", "a", release=release)
-    mass = body("a", 1.0, [0.1] * 3, ORIGIN)
-    scene = Scene(name="b", duration=1.5, body=[mass], joint=[bracket], load=[load])
-    (event,) = mbref.simulate(scene, "taylor").events
-    assert event.released == ("B",) and abs(event.time - 1.0) <= ROUNDED
-
-
 def test_catch_takes_the_door_at_its_stop_and_lets_go_by_its_force(door_motion):
     """The door closes after 0.5 rad / 2 rad/s, and gives up I (2 rad/s)² / 2 without a bounce. From 1 s on
     the moment PUSH (t - 1) loads the catch 1 m from the hinge, up to HOLD; then I φ'' = PUSH (t - 1)."""
