@@ -1,4 +1,4 @@
-"""Recorded motions: exact ones are right, and a planted difference is the first explanation."""
+"""Recorded motions: columns that are right within the tolerance, their headers, and faulty tables."""
 
 import numpy as np
 import pytest
@@ -9,15 +9,11 @@ from crosscheck.judge.tolerances import FLOOR
 from crosscheck.recorded.exact import reference_table, write
 from crosscheck.recorded.judgement import judge_motion
 from crosscheck.recorded.reading import read
-from mbref import rotations
-from mbref.scene import Body, Revolute, Scene, SceneError, SlideSpring, Spring, TorsionSpring, Translational
+from mbref.scene import Body, Revolute, Scene, SceneError, SlideSpring, Translational
 from tests.helpers.tables import double_pendulum
 
 TIMES = np.linspace(0.0, 0.4, 81)
 SCENE = double_pendulum()
-ENDS = {"bodies": ("ground", "lower"), "points": ((1.0, 0.5, 0.2), (0.9, 0.1, 0.0))}
-SPRING = Spring(**ENDS, stiffness=30.0, natural_length=0.3)
-SPRUNG = SCENE.with_(load=[SPRING])  # without a spring only ratios of masses matter
 
 
 @pytest.fixture(scope="module")
@@ -25,53 +21,6 @@ def table() -> dict[str, np.ndarray]:
     found = reference_table(SCENE, TIMES)
     found.pop("bound")
     return found
-
-
-def of_other(scene: Scene = SCENE, **changes) -> dict[str, np.ndarray]:
-    """The reference motion of a changed scene."""
-    found = reference_table(scene.with_(**changes), TIMES)
-    found.pop("bound")
-    return found
-
-
-def another_point(table) -> dict[str, np.ndarray]:
-    q = np.array([table[f"lower.orientation.{a}"] for a in "wxyz"]).T
-    arm = rotations.rotate(q, np.array([0.1, -0.2, 0.05]))
-    kept = {n: c for n, c in table.items() if "velocity" not in n}
-    names = [f"lower.position.{axis}" for axis in "xyz"]
-    return kept | {name: kept[name] + arm[:, i] for i, name in enumerate(names)}
-
-
-def lighter(body: str, factor: float) -> list[Body]:
-    return [
-        b
-        if b.name != body
-        else b.model_copy(update={"mass": b.mass * factor, "inertia": tuple(factor * i for i in b.inertia)})
-        for b in SCENE.body
-    ]
-
-
-def of_kind(table, kind: str, factor: float) -> dict[str, np.ndarray]:
-    return {n: c * factor if f".{kind}" in n else c for n, c in table.items()}
-
-
-PLANTED = {
-    "damping": (
-        SCENE,
-        lambda t: of_other(load=[TorsionSpring(joint="B", stiffness=0.0, damping=0.02)]),
-        "damping of 0.02 N m s/rad in joint 'B'",
-    ),
-    "mass": (
-        SPRUNG,
-        lambda t: of_other(SPRUNG, body=lighter("lower", 0.9)),
-        "mass and inertia of body 'lower' times 0.9",
-    ),
-    "missing body": (
-        SPRUNG,
-        lambda t: of_other(SPRUNG, body=lighter("upper", 1e-3)),
-        "body 'upper' has no mass",
-    ),
-}
 
 
 @pytest.mark.parametrize(
@@ -89,40 +38,6 @@ def test_column_is_right_within_the_tolerance_of_its_scale(table, tolerance, rig
     found = judge_motion(SCENE, off, tolerance=tolerance)
     assert tuple(c.is_right for c in found.columns) == right
     assert found.is_right == all(right) and (found.columns[0].begins is None) == right[0]
-
-
-@pytest.mark.slow  # references of changed scenes, which take seconds
-@pytest.mark.parametrize(("scene", "plant", "says"), PLANTED.values(), ids=PLANTED)
-def test_planted_difference_is_the_first_explanation(scene, plant, says, table):
-    """The recorded motion is of a changed scene: damping in a joint, a mass times 0.9, or a mass times 1e-3,
-    which is reported as no mass. With the change that the sentence names, less than 1e-3 of the difference
-    between recorded motion and reference remains."""
-    found = judge_motion(scene, plant(table))
-    assert not found.is_right
-    assert found.explanations[0].sentence.startswith(says), found.explanations
-    assert found.explanations[0].remains < 1e-3
-
-
-PAIRS = {
-    "millimetres and degrees": (
-        lambda t: of_kind(of_kind(t, "position", 1e3), "angle", 180 / np.pi),
-        ("all columns of position: in mm, not m", "all columns of angle: in degrees, not rad"),
-    ),
-    "millimetres and point": (
-        lambda t: of_kind(another_point(t), "position", 1e3),
-        ("all columns of position: in mm, not m", "lower: a point at (100, -200, 50) m"),
-    ),
-}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("plant", "says"), PAIRS.values(), ids=PAIRS)
-def test_two_planted_differences_are_the_first_explanation(plant, says, table):
-    """Columns of the exact table have two changes, named in the test's id. The first explanation has the
-    words for each (``says``); with both changes less than 1e-3 of the difference remains."""
-    (first, *_) = judge_motion(SCENE, plant(table)).explanations
-    assert all(sentence in first.sentence for sentence in says), first.sentence
-    assert first.remains < 1e-3
 
 
 def test_column_states_the_time_at_which_its_error_begins(table):
