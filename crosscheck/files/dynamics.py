@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from crosscheck.engines.loaders.constrained import accelerations, along
+from crosscheck.engines.loaders.constrained import DEPENDENT, accelerations, along
 from crosscheck.engines.loaders.loader import DURATION
 from crosscheck.engines.loaders.machine import FIXED, REVOLUTE, SCALAR, Joint, Machine, Vector
 from crosscheck.engines.loaders.posed import Pose, Posed, in_single_axes
@@ -25,6 +25,7 @@ MOST = 60  # joints; the motion of a machine with more takes seconds
 REGULAR = 1e-4  # smallest singular value of independent rows / largest one, away from singular positions
 MASSIVE = 1e-10  # least eigenvalue of a mass matrix with a unit diagonal; less is rounding of a massless link
 RTOL = 1e-6  # relative tolerance of the motion; the error found is 1e-8 and less
+SINGULAR = 0.1  # least singular value of the rows / that at the start; less is near a singular position
 MOST_WORK = 3000  # evaluations times joints of a motion: at most twenty seconds; a stiff one takes minutes
 
 
@@ -131,22 +132,38 @@ def _accelerations(machine: Machine, state: State) -> list[float]:
     return made
 
 
-class TooStiff(Exception):
-    """A motion that takes more than MOST_WORK."""
+class NoTruth(Exception):
+    """The reason for which the end of a motion is not known, or is no test of engines."""
 
 
 def end_of(machine: Machine, start: State, size: float, gravity: Vector) -> dict[str, float]:
-    """Return the displacements of hinges and slides after ``DURATION``, by DOP853; raises TooStiff."""
+    """Return the displacements of hinges and slides after ``DURATION``, by DOP853.
+
+    Raises NoTruth for a motion that takes more than MOST_WORK, and for one that comes near a singular
+    position, where small errors of engines grow and the motion may branch.
+    """
     names, number, evaluated = start.joints, len(start.joints), itertools.count(1)
     single = _single(machine)
     whole = machine if len(single) == number else in_single_axes(machine)
+    at_start = _singular_values(whole, start, size)
+    rank = int(np.sum(at_start > DEPENDENT * at_start.max(initial=0.0)))
 
     def change(_: float, y: np.ndarray) -> np.ndarray:
         if next(evaluated) * number > MOST_WORK:
-            raise TooStiff
+            raise NoTruth("the file's motion is too stiff for the reference")
         pose, rates = (dict(zip(names, half.tolist(), strict=True)) for half in np.split(y, 2))
-        return np.append(y[number:], _accelerations(machine, state_at(whole, pose, rates, size, gravity)))
+        now = state_at(whole, pose, rates, size, gravity)
+        if rank and _singular_values(whole, now, size)[rank - 1] < SINGULAR * at_start[rank - 1]:
+            raise NoTruth("the file's motion comes near a singular position")
+        return np.append(y[number:], _accelerations(machine, now))
 
     y = np.array([part[name] for part in (start.pose, start.rates) for name in names])
     run = solve_ivp(change, (0.0, DURATION), y, method="DOP853", rtol=RTOL, atol=RTOL)
     return {name: float(q) for name, q in zip(names, run.y[:number, -1], strict=True) if name in single}
+
+
+def _singular_values(machine: Machine, state: State, size: float) -> np.ndarray:
+    """Return the singular values of the constraint rows at a state; none without rows."""
+    if not len(state.rows):
+        return np.zeros(0)
+    return np.asarray(np.linalg.svd(state.rows * scales(machine, size), compute_uv=False))

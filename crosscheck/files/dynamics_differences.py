@@ -76,7 +76,8 @@ def of_values(
         having = [joint for joint in match.file.joints if len(getattr(joint, part) or ()) > kept]
         less: dict[str, Any] = {j.name: {part: getattr(j, part)[:kept]} for j in having}
         joints = tuple(replace(joint, **less.get(joint.name, {})) for joint in match.file.joints)
-        if having and _worst(replace(match.file, joints=joints), own, right, field)[0] <= tolerance:
+        rest, known = _worst(replace(match.file, joints=joints), own, right, field)
+        if having and known and rest <= tolerance:
             return [Difference(WRONG, "joint", j.name, part, getattr(j, part), words) for j in having]
     return [found]
 
@@ -84,7 +85,8 @@ def of_values(
 def _worst(
     machine: Machine, own: Values, right: Callable[[Machine], Values], field: str
 ) -> tuple[float, Difference | None]:
-    """Return the largest relative difference; none if the reader lacks a joint other than followers."""
+    """Return the largest relative difference; none if the reader lacks a joint other than followers, or if
+    the right values are unknown."""
     followers = {coupling.follower for coupling in machine.couplings or ()}
     pairs: list[tuple[str, float, float]] = []
     for found, expected in zip(own, right(machine) if own else (), strict=False):

@@ -10,11 +10,13 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+
 from crosscheck.engines.loaders import loader
 from crosscheck.engines.loaders.loader import Asked, Built, Loader, built
 from crosscheck.engines.loaders.machine import Machine
 from crosscheck.files.differences import Difference, of_reading
-from crosscheck.files.dynamics import State, TooStiff, accelerations_of, closed_poses, end_of, states_of
+from crosscheck.files.dynamics import NoTruth, State, accelerations_of, closed_poses, end_of, states_of
 from crosscheck.files.dynamics_differences import Values, of_rows, of_values
 from crosscheck.files.matching import Match, ending, matched
 from crosscheck.files.meaning import form_of, meant
@@ -25,6 +27,7 @@ from crosscheck.processes.child import Child, ChildFailed
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s², of gravity torques where the file has no gravity
 MOVED = 1e-3  # of the largest displacement; engines that have the file's machine differ by less than 1e-4
+UNSETTLED = 0.1  # change by shorter steps / largest displacement, above which a motion is not compared
 WITHOUT_MOTION = ("limits", "friction", "gravity", "reference")  # fields on which accelerations do not depend
 WITHOUT_STATICS = {  # fields on which neither mass matrix nor gravity torques depend
     *("limits", "friction", "damping", "stiffness", "rest", "reference", "pitch"),
@@ -70,19 +73,24 @@ class File:
 
     def moved(self, machine: Machine) -> Values:
         """Return the displacements of joints of a machine during the motion from the last state."""
-        return self._moved if machine == self.machine else self._ends(machine)
+        return (self._moved if machine == self.machine else self._ends(machine))[0]
+
+    @property
+    def no_truth(self) -> str:
+        """Return why the file's motion is no test of engines; empty if it is one."""
+        return self._moved[1]
 
     @cached_property
-    def _moved(self) -> Values:
+    def _moved(self) -> tuple[Values, str]:
         return self._ends(self.machine)
 
-    def _ends(self, machine: Machine) -> Values:
-        """Return displacements for each motion; none if one is too stiff."""
+    def _ends(self, machine: Machine) -> tuple[Values, str]:
+        """Return displacements for each motion, or none and the reason."""
         try:
             ends = [end_of(machine, start, self.size, self.asked.gravity) for start in self.states[-1:]]
-        except TooStiff:
-            return []
-        return [since(start.pose, end) for start, end in zip(self.states[-1:], ends, strict=True)]
+        except NoTruth as reason:
+            return [], str(reason)
+        return [since(start.pose, end) for start, end in zip(self.states[-1:], ends, strict=True)], ""
 
 
 def since(start: Mapping[str, float], end: Mapping[str, float]) -> dict[str, float]:
@@ -163,14 +171,15 @@ def _compared(of_reader: Loader, file: File, found: Built, printed: str) -> Read
     match = matched(file.machine, found.machine, of_reader.tolerance)
     lines = [line.strip() for line in COLOURS.sub("", printed).splitlines() if line.strip()]
     messages = (*found.machine.messages, *lines)
+    differing = differences(match, file, found, of_reader.tolerance)
     return Reading(
         of_reader.name,
         found.version,
         replace(found.machine, messages=messages),
-        tuple(differences(match, file, found, of_reader.tolerance)),
+        tuple(differing),
         refusal="",
         messages=messages,
-        unknown=found.faults,
+        unknown={**found.faults, **_no_motion(file, found, differing)},
         convention=of_reader.convention,
     )
 
@@ -186,9 +195,37 @@ def differences(match: Match, file: File, found: Built, tolerance: float) -> lis
     if all(difference.field in WITHOUT_MOTION for difference in reading):
         reading += of_values(match, found.accelerations, file.accelerations, "acceleration", tolerance)
     if all(difference.field in WITHOUT_MOTION for difference in reading):
-        ends = [since(pose, end) for (pose, _), end in zip(asked.starts, found.ends, strict=False)]
-        reading += of_values(match, ends, file.moved, "displacement", MOVED)
+        ends, change = displacements(file, found), _change(file, found)
+        if change <= UNSETTLED:
+            own = [short for short, _ in ends]
+            reading += of_values(match, own, file.moved, "displacement", MOVED + change)
     return reading
+
+
+def displacements(file: File, found: Built) -> list[tuple[Mapping[str, float], Mapping[str, float]]]:
+    """Return an engine's displacements since each start, by its shortest steps and by longer ones."""
+    starts = zip(file.asked.starts, found.ends, strict=False)
+    return [(since(pose, short), since(pose, long)) for (pose, _), (short, long) in starts]
+
+
+def _change(file: File, found: Built) -> float:
+    """Return the largest change of displacements from longer to shorter steps / the largest displacement.
+    Numbers that are not finite are wrong, however short the steps: they count as unchanged."""
+    pairs = [[short[name], long[name]] for short, long in displacements(file, found) for name in short]
+    values = np.array(pairs).reshape(-1, 2)
+    if not np.isfinite(values).all():
+        return 0.0
+    largest = np.abs(values).max(initial=0.0)
+    return float(np.ptp(values, axis=1).max(initial=0.0) / (largest or 1.0))
+
+
+def _no_motion(file: File, found: Built, differing: Sequence[Difference]) -> dict[str, str]:
+    """Return why the motion is not compared, although what was read and the accelerations agree."""
+    if not found.ends or any(difference.field not in WITHOUT_MOTION for difference in differing):
+        return {}
+    if (change := _change(file, found)) > UNSETTLED:
+        return {"motion": f"steps of half the length change its end by {100 * change:.0f} %"}
+    return {"motion": file.no_truth} if file.no_truth else {}
 
 
 def readings(file: File, readers: Sequence[Reader], time_limit: float, say: Say, done: Say) -> list[Reading]:

@@ -14,7 +14,10 @@ from crosscheck.engines.loaders.posed import Pose
 
 MJCF, URDF, SDF = "MJCF", "URDF", "SDF"
 DOUBLE, SINGLE = 1e-6, 1e-4  # largest relative difference of numbers that agree, by the engine's precision
-DURATION, STEP = 0.1, 1e-3  # s, of a compared motion and of its longer steps
+DURATION, STEPS = (
+    0.1,
+    (2e-3, 1e-3, 5e-4),
+)  # s, of a compared motion and of its steps, each half of the last one
 
 
 class Loaded(ABC):
@@ -87,8 +90,8 @@ class Asked:
 class Built:
     """Version of the package, the machine, and the engine's answers to each question.
 
-    ``ends`` are displacements after a motion from each start, extrapolated from two sizes of steps to step
-    zero. ``faults`` is why a quantity is missing, by its name.
+    ``ends`` are displacements after a motion from each start, extrapolated to step zero from the two shortest
+    steps, and from the two longest ones. ``faults`` is why a quantity is missing, by its name.
     """
 
     version: str
@@ -96,7 +99,7 @@ class Built:
     statics: Sequence[Statics] = ()
     rows: Sequence[Rows] = ()
     accelerations: Sequence[Mapping[str, float]] = ()
-    ends: Sequence[Mapping[str, float]] = ()
+    ends: Sequence[tuple[Mapping[str, float], Mapping[str, float]]] = ()
     faults: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -115,9 +118,13 @@ def built(loader: Loader, path: Path, form: str, asked: Asked) -> Built:
         faults.update({name: fault} if fault else {})
         return []
 
-    def end(pose: Pose, rates: Pose) -> dict[str, float]:
-        coarse, fine = (loaded.motion(pose, rates, gravity, DURATION, step) for step in (STEP, STEP / 2))
-        return {name: 2 * fine[name] - coarse[name] for name in fine}  # errors are of order one
+    def ends(pose: Pose, rates: Pose) -> tuple[dict[str, float], dict[str, float]]:
+        long, middle, short = (loaded.motion(pose, rates, gravity, DURATION, step) for step in STEPS)
+        by_long, by_short = (  # errors are of order one
+            {name: 2 * fine[name] - coarse[name] for name in fine}
+            for coarse, fine in ((long, middle), (middle, short))
+        )
+        return by_short, by_long
 
     return Built(
         loader.installed(),
@@ -125,6 +132,6 @@ def built(loader: Loader, path: Path, form: str, asked: Asked) -> Built:
         answers("mass matrix", loaded.statics, ((pose, gravity) for pose in asked.poses)),
         answers("rows of loops and couplings", loaded.rows, ((pose,) for pose in asked.closed)),
         answers("accelerations", loaded.accelerations, ((*state, gravity) for state in asked.states)),
-        answers("motion", end, asked.starts),
+        answers("motion", ends, asked.starts),
         faults,
     )
