@@ -78,7 +78,7 @@ def ensemble(
     Raises
     ------
     SceneError, MethodError, InputError
-        As ``simulate``, for the first scene that cannot be simulated.
+        As ``simulate``, for the first scene that cannot be simulated, with its index as a note.
     RecordsError
         If the file contains something else than records.
     OSError
@@ -203,7 +203,9 @@ class Work:
         except BrokenExecutor:
             return self._without_process(jobs)
         self._at_once = int(max(1, min(MOST_AT_ONCE, SECONDS * len(jobs) / max(found.seconds, 1e-9))))
-        self.error = found.error
+        if found.errors:
+            place, self.error = min(found.errors.items())
+            self.error.add_note(f"This is scene {jobs[place].place} of the ensemble, counted from 0.")
         return [(jobs[place], run) for place, run in found.motions([job.scene for job in jobs])]
 
     def _without_process(self, jobs: list[Job]) -> list[tuple[Job, Trajectory]]:

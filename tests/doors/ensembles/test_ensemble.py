@@ -226,12 +226,14 @@ def test_killed_run_is_reported_as_crashed_and_not_stored(tmp_path: Path):
 
 
 def test_runs_before_a_faulty_scene_are_returned():
-    """Scene 25 of 30 has neither masses nor a driver: the runs of 0 to 24 are returned before the error."""
+    """Scene 25 of 30 has neither masses nor a driver: the runs of 0 to 24 are returned before the error. Its
+    note names the scene."""
     scenes = list(variants(DRIVEN, VARY, 30))
     scenes[25] = scenes[25].with_(
         driver=(), body=tuple(body.model_copy(update={"mass": None, "inertia": None}) for body in DRIVEN.body)
     )
     found: list[int] = []
-    with ThreadPoolExecutor(1) as one, pytest.raises(SceneError):
+    with ThreadPoolExecutor(1) as one, pytest.raises(SceneError) as raised:
         found.extend(k for k, _ in ensemble(scenes, TIMES, METHOD, Limits(rtol=1e-3), one))
     assert set(range(25)) <= set(found) and 25 not in found, found
+    assert any("scene 25 " in note for note in raised.value.__notes__)
