@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 from numba import cfunc, f8, i8, njit, types, u4
 from numba.core.typing import Signature
 
@@ -225,8 +226,8 @@ def exchangeable(signature: Signature) -> Callable[[Function], Exchangeable]:
 
 
 def entry(signature: Signature) -> Callable[[Function], Entry]:
-    """Return a decorator for kernels that Python calls."""
-    return lambda function: Entry(function, signature)
+    """Return a decorator for kernels that Python calls. Plain Python has no warnings of overflow either."""
+    return lambda function: Entry(np.errstate(all="ignore")(function) if PLAIN else function, signature)
 
 
 def prepare_all(kernels: Sequence[Exchangeable], method: str = "") -> None:
