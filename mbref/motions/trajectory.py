@@ -39,7 +39,7 @@ class Outcome(enum.Enum):
         "the motion reaches a singular position, which the method does not cross",
     )
     UNDECIDED = ("UNDECIDED", "", "rounding errors would decide the motion beyond a singular position")
-    LEFT_MOTION = ("LEFT_MOTION", "", "the run continued along another motion than the exact one")
+    LEFT_MOTION = ("LEFT_MOTION", "", "the run left the exact motion, by another branch or by drift")
     TIMED_OUT = ("TIMED_OUT", "", "the time limit was reached")
     CRASHED = ("CRASHED", "", "the process ended without a result")
 
