@@ -193,7 +193,8 @@ def _within_bounds(
         at = first
         for _ in range(NEWTON):
             rate, rest = moved(at, 1), left - moved(at)
-            step = np.divide(rest, rate, out=np.zeros_like(rest), where=rate != 0.0)
+            with np.errstate(over="ignore"):  # an infinite step ends at a limit
+                step = np.divide(rest, rate, out=np.zeros_like(rest), where=rate != 0.0)
             at = np.clip(at + step, low, high)
         found |= np.abs(left - moved(at)) <= bound
     return found

@@ -145,6 +145,17 @@ def test_times_of_few_digits_are_compared_within_their_rounding_of_large_angles(
         assert crosscheck.judge_motion(scene, path).is_right is is_right
 
 
+def test_wrong_column_of_a_body_that_hardly_moves_is_off_at_rounded_times(tmp_path: Path) -> None:
+    """Gravity is 1e-309 m/s². Times of two digits may move within their rounding; no position needs it."""
+    scene = Scene(
+        name="far", gravity=(0.0, 0.0, -1e-309), duration=1.0, body=[body("a", 1.0, [1.0] * 3, (0.0,) * 3)]
+    )
+    path = tmp_path / "run.csv"
+    for z, is_right in ((0.0, True), (1.0, False)):
+        path.write_text(f"time,a.z\n0.00,{z}\n0.33,{z}\n0.34,{z}\n0.91,{z}\n", encoding="utf-8")
+        assert crosscheck.judge_motion(scene, path).is_right is is_right
+
+
 def test_zero_among_numbers_with_an_exponent_is_exact(tmp_path: Path) -> None:
     """A small angle in the format of 1.234e-05 has four digits. Written as 0.000e+00 it is off: this cell is
     zero, and not a number below 5e-4 that is rounded to three decimals."""
