@@ -7,19 +7,22 @@ centre of mass. A cut joint carries a part of its body's mass on its other side,
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import count
 from typing import Any
 
 import numpy as np
 
 from crosscheck.engines.mujoco.model import COUPLING, POWERS, description
-from crosscheck.engines.shared.spanning_tree import Link, Tree, spanning_tree
+from crosscheck.engines.shared.spanning_tree import FREE, Link, Tree, spanning_tree
 from crosscheck.refusals import MOST_COUPLED
 from mbref import rotations
 from mbref.formats import Exported
 from mbref.scene import Force, JointForce, JointLoad, JointTorque, Moment, Scene, SceneError
 
 CONSTANT = (Moment, Force)  # loads that MJCF cannot describe
+RESERVED = ("world",)  # names that a body of MJCF cannot have
+LEAST_INERTIA = 1e-15  # kg, kg m²: mjMINVAL, the least mass and moment of a moving body that MuJoCo reads
 KEYFRAME = "loads"  # with the control values of motors that stand for forces and torques of joints
 
 
@@ -39,37 +42,56 @@ def write(scene: Scene) -> Exported:
     tree = spanning_tree(bare)
     spec, pushed = description(bare, tree)
     spec.modelname = scene.name
-    names = _names(bare, tree)
-    for k, link in enumerate(tree.links):
-        body = spec.body(f"link {k}")
+    parts = {f"link {k}": name for k, name in enumerate(_names(bare, tree))}
+    for (key, name), link in zip(parts.items(), tree.links, strict=True):
+        body = spec.body(key)
         _true_inertia(body, link)
-        body.name = names[k]
-    for k, closure in enumerate(tree.closures):
-        if closure.kind == "point":  # a weld joins two parts of a body
-            spec.equality(f"closure {k}").name = bare.joint[closure.joint].name
-    new = _name_joints(spec, bare, tree)
+        if link.mobilities and (least := min(body.mass, *body.inertia)) < LEAST_INERTIA:
+            fault = (
+                f"body {name!r}: MuJoCo reads no moving body with a mass or moment of inertia of {least:.3g}"
+            )
+            raise SceneError([fault])
+    joints_of_file, equalities = _joint_names(bare, tree), _equality_names(bare, tree)
+    new: dict[str, str] = {}
+    other: list[str] = []
+    for kind, wanted in ("body", parts), ("joint", joints_of_file), ("equality", equalities):
+        given = _distinct(wanted, RESERVED if kind == "body" else ())
+        new |= given
+        other += [f"{kind} name {wanted[k]!r}: is {given[k]!r}" for k in wanted if given[k] != wanted[k]]
     motors = [(new[name], amount) for name, amount, _ in pushed]
-    return Exported(_text(spec, new, motors), tuple(_left_out(scene)))
+    return Exported(_text(spec, new, motors), (*other, *_left_out(scene)))
+
+
+def _distinct(names: dict[str, str], taken: Iterable[str]) -> dict[str, str]:
+    """Return different names by key: a name that is taken gets a number, as in ``world (2)``."""
+    found, used = {}, {*taken, *names.values()}
+    seen = set(taken)
+    for key, name in names.items():
+        numbered = (f"{name} ({k})" for k in count(2))
+        found[key] = next(each for each in numbered if each not in used | seen) if name in seen else name
+        seen.add(found[key])
+    return found
 
 
 def _text(spec: Any, new: dict[str, str], motors: Sequence[tuple[str, float]]) -> str:
     """Return the MJCF text with all digits: MuJoCo's own writer prints six.
 
-    ``motors`` are joints with their forces or torques, the control values of the keyframe ``loads``.
+    ``new`` has the file's name of each body, joint and equality by its name in ``spec``. ``motors`` are
+    joints with their forces or torques, the control values of the keyframe ``loads``.
     """
     root = ET.Element("mujoco", model=spec.modelname)
     ET.SubElement(root, "compiler", angle="radian")
     ET.SubElement(root, "option", gravity=_digits(spec.option.gravity))
-    _add_body(ET.SubElement(root, "worldbody"), spec.worldbody)
+    _add_body(ET.SubElement(root, "worldbody"), spec.worldbody, new)
     equalities = ET.SubElement(root, "equality")
     for closure in spec.equalities:
         kind = closure.type.name.removeprefix("mjEQ_").lower()
         if kind == "joint":
             ends = {"joint1": new[closure.name1], "joint2": new[closure.name2]}
-            own = {"name": closure.name.removeprefix(COUPLING), "polycoef": _digits(closure.data[:5])}
+            own = {"name": new[closure.name], "polycoef": _digits(closure.data[:5])}
             ET.SubElement(equalities, kind, own | ends)
             continue
-        ET.SubElement(equalities, kind, name=closure.name, site1=closure.name1, site2=closure.name2)
+        ET.SubElement(equalities, kind, name=new[closure.name], site1=closure.name1, site2=closure.name2)
     tendons = ET.SubElement(root, "tendon")
     for spring in spec.tendons:
         element = ET.SubElement(
@@ -95,7 +117,7 @@ def _text(spec: Any, new: dict[str, str], motors: Sequence[tuple[str, float]]) -
     return ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _add_body(element: ET.Element, body: Any) -> None:
+def _add_body(element: ET.Element, body: Any, new: dict[str, str]) -> None:
     """Add inertia, joints, sites and children of a body."""
     if element.tag == "body":
         ET.SubElement(
@@ -117,11 +139,11 @@ def _add_body(element: ET.Element, body: Any) -> None:
         }
         spring = {key: _digits(value) for key, value in numbers.items() if np.any(value)}
         place = {} if kind == "free" else {"pos": _digits(joint.pos)}
-        ET.SubElement(element, "joint", {"name": joint.name, "type": kind, **place, **turning, **spring})
+        ET.SubElement(element, "joint", {"name": new[joint.name], "type": kind, **place, **turning, **spring})
     for site in body.sites:
         ET.SubElement(element, "site", name=site.name, pos=_digits(site.pos))
     for child in body.bodies:
-        _add_body(ET.SubElement(element, "body", name=child.name, pos=_digits(child.pos)), child)
+        _add_body(ET.SubElement(element, "body", name=new[child.name], pos=_digits(child.pos)), child, new)
 
 
 def _digits(numbers: Any) -> str:
@@ -139,19 +161,27 @@ def _names(scene: Scene, tree: Tree) -> list[str]:
     return names
 
 
-def _name_joints(spec: Any, scene: Scene, tree: Tree) -> dict[str, str]:
-    """Name joints as the scene does, with a number if a joint consists of several elementary motions; returns
-    new names by old ones."""
+def _joint_names(scene: Scene, tree: Tree) -> dict[str, str]:
+    """Return the scene's names of joints, with a number if a joint consists of several elementary motions, by
+    names in the specification."""
     new: dict[str, str] = {}
     for k, link in enumerate(tree.links):
-        if link.joint >= 0:
-            count = len(link.mobilities)
-            for i in range(count):
-                name = scene.joint[link.joint].name
-                new[f"joint {k}.{i}"] = name if count == 1 else f"{name} {i + 1}"
-    for old, name in new.items():
-        spec.joint(old).name = name
+        motions = len(link.mobilities)
+        for i, mobility in enumerate(link.mobilities):
+            old = f"free {k}" if mobility.kind == FREE else f"joint {k}.{i}"
+            name = scene.joint[link.joint].name if link.joint >= 0 else old
+            new[old] = name if motions == 1 or link.joint < 0 else f"{name} {i + 1}"
     return new
+
+
+def _equality_names(scene: Scene, tree: Tree) -> dict[str, str]:
+    """Return the scene's names of closures and couplings by names in the specification."""
+    closures = {
+        # a weld joins two parts of a body
+        f"closure {k}": scene.joint[each.joint].name if each.kind == "point" else f"closure {k}"
+        for k, each in enumerate(tree.closures)
+    }
+    return closures | {COUPLING + each.name: each.name for each in scene.coupling}
 
 
 def _true_inertia(body: Any, link: Link) -> None:
@@ -160,7 +190,7 @@ def _true_inertia(body: Any, link: Link) -> None:
     moments, axes = np.linalg.eigh(link.inertia)
     axes[:, 2] *= np.sign(np.linalg.det(axes))
     moments = np.maximum(moments, 0.0)
-    moments[2] = min(moments[2], (moments[0] + moments[1]) * (1 - 1e-15))
+    moments[2] = max(moments[1], min(moments[2], (moments[0] + moments[1]) * (1 - 1e-15)))
     body.mass, body.inertia = link.mass, moments
     body.ipos, body.iquat = link.offset, rotations.from_matrix(axes)
 
@@ -168,8 +198,8 @@ def _true_inertia(body: Any, link: Link) -> None:
 def _left_out(scene: Scene) -> Iterator[str]:
     for coupling in scene.coupling:
         if len(coupling.joints) > MOST_COUPLED:
-            count = len(coupling.joints)
-            yield f"coupling {coupling.name}: an equality of MJCF relates two joints, not {count}"
+            coupled = len(coupling.joints)
+            yield f"coupling {coupling.name}: an equality of MJCF relates two joints, not {coupled}"
         elif coupling.powers > POWERS:
             yield f"coupling {coupling.name}: an equality of MJCF has degree {POWERS}, not {coupling.powers}"
     for driver in scene.driver:

@@ -15,7 +15,7 @@ from mbref import formats, rotations, simulate
 from mbref.cli import main
 from mbref.formats import ImportOptions
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import Scene, SceneError
+from mbref.scene import Body, Revolute, Scene, SceneError, Spring, Universal
 from mbref.scenes import find_scene
 from tests.helpers.measured import MARGIN
 
@@ -103,6 +103,15 @@ def test_piston_of_a_cut_slide_is_read_in_two_parts_with_its_mass_after_a_round_
     both = mass["pin"] + mass["piston"]
     assert found["pin"] + found["piston (share 4)"] == pytest.approx(both, rel=1e-12)  # rounding
     assert acceleration_difference(again.scene, tmp_path / "again.xml") < MARGIN * ALIKE
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_spring_whose_ends_meet_survives_a_round_trip(tmp_path):
+    scene = find_scene("four_bar_gravity").with_(
+        load=[Spring(bodies=("ground", "crank"), points=[(0, 1, 0)] * 2, stiffness=9, natural_length=0)]
+    )
+    formats.write(scene, tmp_path / "scene.xml")
+    assert formats.read(tmp_path / "scene.xml").scene.load == scene.load
 
 
 @pytest.mark.parametrize("name", EXPORTED)
@@ -227,13 +236,28 @@ def test_import_writes_a_scene_that_export_writes_as_mjcf(tmp_path, capsys):
     assert mbref.counts(again) == mbref.counts(five), "bodies, rows and freedoms"
 
 
-def test_export_refuses_a_massless_link_by_its_name():
-    """MuJoCo reads no moving body without mass."""
+@pytest.mark.parametrize(
+    ("mass", "inertia", "says"),
+    [(0.0, (0.0, 0.0, 0.0), "is a massless link"), (1.0, (0.0, 0.1, 0.1), "moment of inertia of 0")],
+)
+def test_export_refuses_a_body_that_mujoco_does_not_read_by_its_name(mass, inertia, says):
+    """MuJoCo reads no moving body without mass, nor without inertia about an axis."""
     scene = find_scene("four_bar_gravity")
-    empty = {"mass": 0.0, "inertia": (0.0, 0.0, 0.0)}
-    bodies = [b.model_copy(update=empty) if b.name == "coupler" else b for b in scene.body]
-    with pytest.raises(SceneError, match="body 'coupler': is a massless link"):
+    light = {"mass": mass, "inertia": inertia}
+    bodies = [b.model_copy(update=light) if b.name == "coupler" else b for b in scene.body]
+    with pytest.raises(SceneError, match=f"body 'coupler': .*{says}"):
         FORMAT.write(scene.with_(body=bodies))
+
+
+def test_names_that_mjcf_cannot_have_or_that_export_uses_get_a_number(tmp_path):
+    """MJCF's world is no body; hinges A 1 and A 2 stand for a universal joint A."""
+    bodies = [Body(name=n, mass=1, inertia=(1, 1, 1), position=(0, 0, 0)) for n in ("link 1", "world")]
+    first = Universal.at("A", ("ground", "link 1"), anchor=(0, 0, 1), axes=((1, 0, 0), (0, 1, 0)))
+    hinge = Revolute.at("A 1", ("link 1", "world"), anchor=(0, 0, 0), axis=(1, 0, 0))
+    left = formats.write(Scene(name="names", body=bodies, joint=[first, hinge]), tmp_path / "a.xml")
+    assert left[:2] == ("body name 'world': is 'world (2)'", "joint name 'A 1': is 'A 1 (2)'")
+    again = formats.read(tmp_path / "a.xml").scene
+    assert [each.name for each in (*again.body, again.joint[1])] == ["link 1", "world (2)", "A 1 (2)"]
 
 
 def test_export_refuses_an_unknown_format_and_import_a_missing_file(tmp_path, capsys):

@@ -32,7 +32,7 @@ def _spring(scene: Scene, load: Any, pose: Any, motion: np.ndarray) -> list[tupl
     places, rates = _points(scene, pose, motion, bodies, load.points)
     apart = places[1] - places[0]
     length = np.linalg.norm(apart)
-    along = apart / length
+    along = apart / length if length else np.eye(3)[0]  # MuJoCo's direction of a spring without length
     pull = load.stiffness * (length - load.natural_length) + load.damping * along @ (rates[1] - rates[0])
     return _wrenches(pose, bodies, places, pull * along)
 
