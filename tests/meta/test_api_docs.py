@@ -161,11 +161,6 @@ def scaled(values, factor: float) -> "np.ndarray":
 '''
 
 
-def test_complete_docstring_has_no_fault(tmp_path):
-    """COMPLETE is a function with all sections; the next test takes parts of its docstring away."""
-    assert faults("scaled", imported(tmp_path, COMPLETE).scaled) == []
-
-
 @pytest.mark.parametrize(
     ("old", "new", "fault"),
     [
@@ -177,7 +172,8 @@ def test_complete_docstring_has_no_fault(tmp_path):
     ],
 )
 def test_fault_of_an_incomplete_docstring_is_named(tmp_path, old, new, fault):
-    """In a complete docstring ``old`` is replaced by ``new``."""
+    """In the complete docstring, which has no fault, ``old`` is replaced by ``new``."""
+    assert faults("scaled", imported(tmp_path, COMPLETE).scaled) == []
     module = imported(tmp_path, COMPLETE.replace(old, new, 1))
     found = faults("scaled", module.scaled)
     assert any(fault in text for text in found), found

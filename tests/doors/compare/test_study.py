@@ -10,9 +10,8 @@ import pytest
 
 from crosscheck.engine import Setting
 from crosscheck.study.grid import Case, key, run_case, run_here, study
-from crosscheck.study.search.offers import default_cases
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import Body, Force, Scene
+from mbref.scene import Body, Scene
 from mbref.scenes import SCENES
 from tests import kills
 from tests.helpers.fake_engines import FAKE, FAKES
@@ -159,20 +158,6 @@ def test_key_depends_on_all_of_a_case_except_its_limits_of_time(other: Case, mon
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     assert key(other) != key(case("a"))
     assert key(other) == key(other._replace(time_limit=1.0, reference_time=2.0))
-
-
-def test_default_cases_are_the_settings_of_engines_that_map_the_scene():
-    """A fake engine maps scenes without loads; it has two settings of family "plain" and one of another."""
-    pushed = still(load=(Force(body="block", point=(1.0, 2.0, 3.0), force=(1.0, 0.0, 0.0)),))
-    cases, unable = default_cases(still(), [f"{FAKES}:FAKE"], families=["plain"])
-    assert [str(c.setting) for c in cases] == ["plain seconds=0.1", "plain seconds=0.2"]
-    assert len(default_cases(still(), [f"{FAKES}:FAKE"])[0]) == 3
-    assert unable == []
-    cases, unable = default_cases(pushed, [f"{FAKES}:FAKE"])
-    assert cases == []
-    [refused] = unable
-    assert (refused.scene, refused.engine) == (pushed, f"{FAKES}:FAKE")
-    assert refused.cannot.reason == "this fake has no loads"
 
 
 WHOLE = (200, 20)  # runs, kills
