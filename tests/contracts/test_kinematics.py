@@ -121,6 +121,17 @@ def test_length_of_a_single_body_is_its_way_or_its_radius_of_gyration(parts, mor
     assert constraints.scene_length(scene(body(**parts), **{"duration": 1, **more})) == pytest.approx(length)
 
 
+JOINTS = (hinge("A"), Cylindrical(name="C", bodies=("ground", "c"), anchor=O, axis=X))
+PARTS = scene(body("b", 1.0, 0.0, 0.0), body("c", 3.0, 0.0, 0.0), joint=JOINTS)
+POSE = constraints.initial_poses(PARTS)
+
+
+def test_joint_rates_are_spin_about_and_velocity_along_the_axis():
+    """b spins at 3 rad/s about z, A's axis; c at 1 rad/s about x, C's axis, along which it moves at 2 m/s."""
+    rates = constraints.joint_rates(PARTS, *POSE, np.array([O, (2.0, 5.0, 0.0)]), np.array([(0, 0, 3.0), X]))
+    assert rates["A"] == pytest.approx([3.0, 0.0]) and rates["C"] == pytest.approx([1.0, 2.0])
+
+
 def test_initial_velocity_off_a_hinge_is_rounded_up_to_five_percent_and_refused_above():
     """A body at 3 m/s has 4 or 6 % of this speed along the hinge's axis, 0.12 or 0.18 m/s, which the hinge
     forbids. Up to 5 % the judge takes for rounding."""
