@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 from mbref.linear_algebra.least_norm import least_norm, least_norm_and_null_space, null_space
+from mbref.linear_algebra.redundancy import Redundancy
 
 TOLERANCE = 1e-5  # of the rank: singular values below this fraction of the largest count as zero
 ROUNDING = 1e-12  # of solutions and projections of size 1, of matrices of condition below 1e3
@@ -72,3 +74,18 @@ def test_basis_of_a_null_space_depends_on_the_space_alone(seed):
     assert basis.shape == (9, 5) and np.abs(basis.T @ basis - np.eye(5)).max() < ROUNDING
     assert np.abs(matrix @ basis).max() < ROUNDING
     assert np.abs(other - basis).max() < ROUNDING
+
+
+def test_shares_of_redundant_rows_are_squares_of_left_null_vectors():
+    """Two of six unit rows depend on others; NumPy's singular vectors give the null space. The squared matrix
+    is factorised with 1/α = 1e-10 on its diagonal, which carries the rounding of up to six products. The last
+    row is independent: its share is zero."""
+    rounding = 6 * np.finfo(float).eps / 1e-10
+    matrix = np.random.default_rng(7).normal(size=(6, 9))
+    matrix[2], matrix[4] = 2.0 * matrix[0], matrix[1] - matrix[3]
+    matrix /= np.linalg.norm(matrix, axis=1)[:, None]
+    left, _, _ = np.linalg.svd(matrix)
+    found = Redundancy(csr_array(matrix))
+    assert found.rank == 4
+    np.testing.assert_allclose(found.shares, np.sum(left[:, 4:] ** 2, axis=1), rtol=0, atol=rounding)
+    assert found.shares[5] < 1e-12

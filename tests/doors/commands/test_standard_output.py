@@ -1,5 +1,6 @@
-"""Standard output that cannot be written, and control characters, which would act on a terminal."""
+"""Standard output that cannot be written, or that control characters or banners of engines would spoil."""
 
+import json
 import os
 from contextlib import redirect_stdout, suppress
 
@@ -7,6 +8,7 @@ import pytest
 
 from crosscheck.cli import main as crosscheck
 from mbref.cli import main
+from tests.helpers.fake_engines import FAKES
 from tests.helpers.falling_engine import STONE
 
 PROGRAMS = {"mbref": main, "crosscheck": crosscheck}
@@ -71,3 +73,15 @@ def test_verdict_prints_no_control_character_of_a_header_that_is_not_read(tmp_pa
     assert crosscheck(["judge", str(tmp_path / "stone.toml"), str(table)]) == 0
     said = capsys.readouterr()
     assert "not read: \\x1b[31mred" in said.out and "\x1b" not in said.out + said.err
+
+
+def test_modes_reports_the_crash_of_one_engine_and_hides_the_banner_of_another(capfd):
+    """The engine SEGFAULT ends its process by SIGSEGV. CHATTER, version 1.2.3, writes the word "banner" to
+    the file descriptor of standard output, and has no accelerations."""
+    engines = [word for name in ("SEGFAULT", "CHATTER") for word in ("--engine", f"{FAKES}:{name}")]
+    assert crosscheck(["modes", "point_pendulum", "--starts", "1", "--json", *engines]) == 0
+    out, said = capfd.readouterr()
+    crashed, silent = json.loads(out)["poses"][0]["results"]
+    assert "SIGSEGV" in crashed["reason"] and crashed["error"] is None
+    assert (silent["version"], silent["reason"]) == ("1.2.3", "reports no accelerations")
+    assert "banner" not in out + said

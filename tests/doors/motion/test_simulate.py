@@ -149,3 +149,17 @@ def test_first_step_of_the_length_of_the_run_is_its_only_step(integrator):
     limits = (Limits(rtol=1e-3, first_step=first) for first in (1e-4, 1e-5))
     steps = [simulate(scene, method, [1e-4], each).cost.steps for each in limits]
     assert steps[0] == 1 < steps[1], f"{integrator}: {steps} steps with the first of 1e-4 and 1e-5 s"
+
+
+def test_taylor_named_as_the_integrator_of_alf_dual_in_old_records_is_the_method_taylor():
+    """Options are kept; the name of the method is printed without formulation and stabilisation."""
+    assert str(Method.parse("taylor[order=14]")) == "taylor[order=14]"
+    assert Method.parse("alf-dual+projection/taylor[order=14]") == Method.parse("taylor[order=14]")
+
+
+def test_taylor_with_a_formulation_and_orders_above_30_are_refused():
+    """The first refusal names the right method, the second the interval of orders."""
+    with pytest.raises(MethodError, match=r"taylor has no formulation .* use taylor\[order=8\]"):
+        Method.parse("lm1+none/taylor[order=8]")
+    with pytest.raises(ValueError, match="order must be 4 to 30, got 31"):
+        simulate(SCENES["point_pendulum"](), "taylor[order=31]", [0.1])
