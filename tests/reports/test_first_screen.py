@@ -1,7 +1,6 @@
 """The first screen has the matrix, the mechanism and the figure that follow from the records."""
 
 import re
-from html.parser import HTMLParser
 
 import pytest
 
@@ -73,43 +72,3 @@ def test_every_run_has_a_card_with_the_command_that_repeats_it():
     ]
     shown = [block for block in blocks(groups(), ["records"]) if isinstance(block, Record)]
     assert sorted(card.command for record in shown for card in record.cards) == sorted(expected)
-
-
-class Checked(HTMLParser):
-    """Record elements that are closed in another order than opened, pictures (``<svg role=...>``) whose first
-    element is no title, attributes of scripts, and addresses of what the page loads or leads to."""
-
-    VOID = ("meta", "link", "input", "br", "wbr", "img", "hr")
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open, self.faults, self.scripts, self.addresses, self.pictures = [], [], [], [], 0
-        self.untitled = False
-
-    def handle_starttag(self, tag, attrs):
-        named = dict(attrs)
-        if tag not in self.VOID:
-            self.open.append(tag)
-        if self.untitled and tag != "title":
-            self.faults.append("a picture without a name")
-        self.untitled = tag == "svg" and "role" in named
-        self.pictures += self.untitled
-        self.scripts += [named] if tag == "script" else []
-        self.addresses += [named[name] for name in ("src", "href") if name in named]
-
-    def handle_endtag(self, tag):
-        if not self.open or self.open.pop() != tag:
-            self.faults.append(f"</{tag}> at {self.getpos()}")
-
-
-def test_page_is_well_formed_html_with_one_small_script_that_loads_nothing(page):
-    """Elements close in order; mechanism and speed figure have a title each. Addresses are places of the page
-    and the empty icon. The script is part of the page, has less than 10_000 letters, and names no address,
-    request or module."""
-    checked = Checked()
-    checked.feed(page)
-    assert not checked.faults and not checked.open, (checked.faults, checked.open)
-    assert checked.pictures == 2 and checked.scripts == [{}]
-    assert {address for address in checked.addresses if address[0] != "#"} == {"data:,"}
-    [script] = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
-    assert 0 < len(script) < 10_000 and not re.search(r"http|fetch\(|import|XMLHttp", script)
