@@ -175,12 +175,6 @@ def parabola() -> Solution:
     return Solution(lambda y: np.stack([np.ones_like(y[:, 0]), 2 * y[:, 0]], axis=1), np.zeros(2), 0.5)
 
 
-def test_solution_finds_the_states_at_which_a_component_has_given_values():
-    """y₁ = t² is 0.25 at t = y₀ = 0.5, and 4 at 2."""
-    found = parabola().where(1, np.array([0.25, 4.0])).astype(float)
-    assert found == pytest.approx(np.array([[0.5, 0.25], [2.0, 4.0]]))
-
-
 def test_solution_is_continued_until_its_state_meets_a_condition():
     """The returned state (t, t²) has y₀ ≥ 3."""
     end = parabola().reach(lambda y: y[0] >= 3.0)
