@@ -29,7 +29,8 @@ def pendulum(until: float, **changes) -> Scene:
 
 def test_carts_that_latch_move_on_with_the_mean_velocity_and_keep_it():
     """Carts of 1 kg at 2 m/s and 3 kg at -1 m/s: v = (m₁ v₁ + m₂ v₂) / (m₁ + m₂) = -0.25 m/s, the impulse
-    m₁ (v₁ - v) = 2.25 N s and the loss ½ m₁ m₂ / (m₁ + m₂) (v₁ - v₂)² = 27/8 J. Letting go costs nothing."""
+    m₁ (v₁ - v) = 2.25 N s and the loss ½ m₁ m₂ / (m₁ + m₂) (v₁ - v₂)² = 27/8 J. Letting go costs nothing.
+    Events and columns state when the latch holds; the column of impulses adds them up."""
     motion = mbref.simulate(carts(), times=[0.0, 0.05, 0.1, 0.3, 0.5])
     assert np.allclose(motion.velocity[:, :, 0], [[2, -1]] * 2 + [[-0.25, -0.25]] * 3, rtol=0, atol=ROUNDING)
     assert np.allclose(motion.position[-1, :, 0], [0.1, 0.8], rtol=0, atol=ROUNDING)
@@ -37,11 +38,6 @@ def test_carts_that_latch_move_on_with_the_mean_velocity_and_keep_it():
     latched, released = motion.events
     assert latched.energy_before - latched.energy_after == pytest.approx(27 / 8, rel=ROUNDING)
     assert released.energy_before == released.energy_after
-
-
-def test_events_and_columns_state_when_a_latch_holds_and_its_impulse():
-    """The carts latch at 0.1 s by 2.25 N s, m₁ (v₁ - v), and let go at 0.3 s; the column adds up impulses."""
-    motion = mbref.simulate(carts(), times=[0.0, 0.05, 0.1, 0.3, 0.5])
     assert [(event.engaged, event.released) for event in motion.events] == [(("L",), ()), ((), ("L",))]
     assert motion.joint("L").active.tolist() == [0, 0, 1, 0, 0]
     assert motion.columns("L.impulse.x")["L.impulse.x"].tolist() == pytest.approx([0, 0, 2.25, 2.25, 2.25])
