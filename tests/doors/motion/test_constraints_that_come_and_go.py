@@ -157,27 +157,6 @@ def test_command_prints_events_and_records_them(tmp_path, capsys):
     assert [event["time"] for event in record["events"]] == [0.1, 0.3]
 
 
-IN_ORDER = "joint[L].active: must be intervals in order that neither touch nor overlap, got "
-HINGE = {"type": "revolute", "axis": [0, 0, 1]}
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"active": [[0.3, 0.1]]}, IN_ORDER),
-        ({"active": [[0.1, 0.3], [0.3, 0.4]]}, IN_ORDER),
-        ({"active": [0.1, 0.3]}, "joint[L].active[0]: must be a begin and an end (s), got 0.1"),
-        ({"active": None, "engages": "given_pose"}, "joint[L].engages: is of a constraint with intervals"),
-        (HINGE | {"armature": 1.0}, "joint[L].armature: needs a joint that always holds, and this one has"),
-    ],
-)
-def test_faults_of_intervals_name_the_field(changes, said):
-    """The changes are of the latch L of the carts, which has one interval without them."""
-    with pytest.raises(SceneError) as fault:
-        carts(**changes)
-    assert said in str(fault.value)
-
-
 TURNED = [{"joint": "A", "polynomial": [0.0, 1.0]}]  # a driver of the pivot
 
 

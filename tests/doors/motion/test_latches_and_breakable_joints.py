@@ -224,6 +224,10 @@ def test_release_by_a_force_that_redundant_joints_share_is_refused_by_name(facto
     assert "redundant constraints" in motion_by(natural_motion, scene, [0.0, 1.0], EXTENDED).reason
 
 
+IN_ORDER = "joint[L].active: must be intervals in order that neither touch nor overlap, got "
+MOTOR = {"type": "revolute", "axis": [0, 0, 1], "armature": 1.0, "active": [[0.1, 0.3]]}
+
+
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
@@ -243,9 +247,14 @@ def test_release_by_a_force_that_redundant_joints_share_is_refused_by_name(facto
             {"holds_at_start": True},
             "joint[L].holds_at_start: is of a constraint with active, when or release",
         ),
+        ({"active": [[0.3, 0.1]]}, IN_ORDER),
+        ({"active": [[0.1, 0.3], [0.3, 0.4]]}, IN_ORDER),
+        ({"active": [0.1, 0.3]}, "joint[L].active[0]: must be a begin and an end (s), got 0.1"),
+        ({"engages": "given_pose"}, "joint[L].engages: is of a constraint with intervals"),
+        (MOTOR, "joint[L].armature: needs a joint that always holds, and this one has"),
     ],
 )
-def test_fault_of_a_condition_names_joint_and_field(changes, says):
+def test_fault_of_intervals_or_of_a_condition_names_joint_and_field(changes, says):
     """The changes are of the latch L between two carts on the slides A and B."""
     with pytest.raises(SceneError) as fault:
         carts(**{"active": None, **changes})
