@@ -161,16 +161,18 @@ class Tangent:
         changes = [directional_derivative(lambda y: self.accelerations(y, zero), h) for h in np.diag(steps)]
         return np.array(changes).T / steps
 
-    def by_rate(self, share: float) -> np.ndarray:
-        """Return B = ∂y''/∂y' (f, f) by differences of order 8, with a share of the step."""
-        zero, steps = np.zeros(self.freedoms), share * DIFFERENCE_STEP / self.sizes * self.rate_scale
+    def by_rate(self, scale: float) -> np.ndarray:
+        """Return B = ∂y''/∂y' (f, f) by differences of order 8, whose step belongs to a rate ``scale``,
+        1/s."""
+        zero, steps = np.zeros(self.freedoms), DIFFERENCE_STEP / self.sizes * scale
         changes = [directional_derivative(lambda y: self.accelerations(zero, y), h) for h in np.diag(steps)]
         return np.array(changes).T / steps
 
-    @property
-    def rate_scale(self) -> float:
-        """Rate, 1/s, of motions by the forces over one length of the mechanism; 1 without forces."""
-        return float(np.sqrt((self.pushes / self.sizes).max(initial=0.0))) or 1.0
+    def rate_scale(self, by_place: np.ndarray) -> float:
+        """Return the rate, 1/s, of motions by the forces over one length of the mechanism, or by A (f, f)
+        where the forces on a body cancel; 1 without forces."""
+        squares = np.append(self.pushes / self.sizes, np.abs(by_place))
+        return float(np.sqrt(squares.max(initial=0.0))) or 1.0
 
 
 def _weightless(model: Model, x: np.ndarray) -> SceneError:

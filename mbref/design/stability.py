@@ -41,12 +41,13 @@ class Linear(NamedTuple):
 def linear_at(tangent: Tangent, away: np.ndarray) -> Linear:
     """Return the equations of small motions about a pose that may be ``away`` (f,) from the equilibrium."""
     place, place_errors = _by_place(tangent)
-    rate, other_rate = tangent.by_rate(1.0), tangent.by_rate(OTHER_STEP)
+    scale = tangent.rate_scale(place)
+    rate, other_rate = tangent.by_rate(scale), tangent.by_rate(OTHER_STEP * scale)
     if away.any():
         here, around = tangent.slope(), (tangent.slope(away), tangent.slope(-away))
         place_errors = place_errors + np.max([np.abs(slope - here) for slope in around], axis=0)
     rounded = tangent.pushes[:, None] * _inverse_steps(tangent)
-    rate_errors = CHANGES * np.abs(rate - other_rate) + rounded / tangent.rate_scale
+    rate_errors = CHANGES * np.abs(rate - other_rate) + rounded / scale
     return Linear(place, rate, place_errors, rate_errors + ROUNDINGS * EPSILON * np.abs(rate))
 
 

@@ -25,6 +25,17 @@ def test_a_damped_torsion_spring_has_the_roots_of_its_equation():
     assert each.damping_ratios[0] == pytest.approx(-roots[0].real / abs(roots[0]), rel=rounding)
 
 
+def test_damping_is_exact_where_the_forces_of_stretched_springs_on_a_body_cancel():
+    """m s² + c s + k₁ + k₂ = 0 of a slide between two springs along its guide, without weight."""
+    at, guide = (0.7, 0.0, 0.0), slide("A", "rod", ORIGIN, (1.0, 0.0, 0.0))
+    spring = {"type": "spring", "bodies": ["ground", "rod"], "natural_length": 0.3}
+    left = spring | {"points": [ORIGIN, at], "stiffness": 10.0, "damping": 0.5}
+    right = spring | {"points": [(1.1, 0.0, 0.0), at], "stiffness": 40.0}  # stretched by 0.1 m, left by 0.4 m
+    [each] = equilibria(pendulum(gravity=ORIGIN, joint=[guide], load=[left, right]), starts=1)
+    exact = np.roots([MASS, 0.5, 50.0])
+    assert sorted(each.eigenvalues, key=np.imag) == pytest.approx(sorted(exact, key=np.imag), rel=1e-10)
+
+
 @pytest.mark.parametrize("height", [1e-1, 1e-2, 1e-3, 1e-4])
 def test_frequency_on_a_spring_far_shorter_than_the_mechanism_is_that_of_its_stiffness(height):
     """A slide of 2 kg, 1 m from its guide's anchor, is on a spring across the guide. The spring of 300 N/m is
