@@ -10,12 +10,13 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from crosscheck.conformance.agreeing import accelerations_at_start, alternatives_agree
+from crosscheck.conformance.balancing import balanced, workless
 from crosscheck.conformance.changes.copies import Outside
 from crosscheck.conformance.changes.relations import RELATIONS
 from crosscheck.conformance.keeping import LAWS
 from crosscheck.conformance.precise import double_precision, refined, settled, smooth
 from crosscheck.conformance.related import related
-from crosscheck.conformance.trial import NEIGHBOURS, Bench, Finding, Specimen, difference
+from crosscheck.conformance.trial import NEIGHBOURS, Bench, Finding, Specimen, difference, worst_body
 from crosscheck.conformance.vanishing import vanishing
 from crosscheck.engine import Cannot
 from crosscheck.judge.constraints import scene_length
@@ -24,15 +25,15 @@ from crosscheck.judge.gauss_principle import stacked
 from crosscheck.judge.metrics import in_scene_order
 from crosscheck.judge.momentum import momentum_series
 from crosscheck.judge.openings import counted_violation, uncounted_couplings
+from crosscheck.judge.pieces import has_pieces
 from crosscheck.judge.precision import motion_rate
-from crosscheck.judge.reaction_balance import balance, idle
 from crosscheck.judge.tolerances import GRAINS, LIKE_TRUTH, REACTIONS, SAME_MOTION, STAYS_CLOSED, UNIT_NORM
-from crosscheck.judge.violations import violation_series
+from crosscheck.judge.violations import most_violated, violation_series
 from crosscheck.refusals import shortened
 from crosscheck.study.words.text import listed
 from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory
-from mbref.scene import Moment, Scene
+from mbref.scene import Moment
 
 SECOND = ("acceleration", "angular_acceleration")
 NORMS = 4.0  # largest deviation of a quaternion's length from 1, in roundings of the engine
@@ -72,7 +73,13 @@ def closure(bench: Bench) -> Finding:
     """Joints and drivers hold at every sample, by the judge's own joint equations."""
     uncounted = uncounted_couplings(bench.scene, bench.motion)
     remark = f"turns of {listed(uncounted)} cannot be counted between samples" if uncounted else ""
-    return vanishing(bench, lambda k: counted_violation(bench.scene, bench.sweep[k]), STAYS_CLOSED, remark)
+    return vanishing(
+        bench,
+        lambda k: counted_violation(bench.scene, bench.sweep[k]),
+        STAYS_CLOSED,
+        remark,
+        lambda: f"most at {most_violated(bench.scene, bench.motion)!r}",
+    )
 
 
 def honest_end(bench: Bench) -> Finding:
@@ -112,6 +119,7 @@ def truth(bench: Bench) -> Finding:
         lambda k: difference(bench.scene, bench.sweep[k], bench.exact),
         LIKE_TRUTH,
         bench.exact.engine,
+        lambda: f"most of {worst_body(bench.scene, bench.motion, bench.exact)!r}",
     )
 
 
@@ -194,28 +202,6 @@ def _largest(series: np.ndarray | None) -> float:
     return np.inf if series is None else float(series.max())
 
 
-def balanced(bench: Bench) -> Finding | Outside:
-    """Reactions and loads on every body agree with its exact acceleration, by the judge's own loads."""
-    return _of_reactions(bench, balance)
-
-
-def workless(bench: Bench) -> Finding | Outside:
-    """No reaction acts along a motion that its joint allows, by the judge's own joint equations."""
-    return _of_reactions(bench, idle)
-
-
-def _of_reactions(
-    bench: Bench, measured: Callable[[Scene, Trajectory, Trajectory], float]
-) -> Finding | Outside:
-    if not bench.motion.reactions:
-        return Outside("the engine gives no reactions, or the scene has no joint")
-    if bench.exact.acceleration is None or not bench.scene.has_mass():
-        return Outside("the accelerations are not known here")
-    if silent := [joint.name for joint in bench.scene.joint if joint.name not in bench.motion.reactions]:
-        return Finding(np.inf, REACTIONS, f"no reaction is given in {', '.join(silent)}")
-    return vanishing(bench, lambda k: measured(bench.scene, bench.sweep[k], bench.exact), REACTIONS)
-
-
 def silence(bench: Bench) -> Finding:
     """A run prints nothing and leaves no file in its working directory."""
     seen = bench.finest
@@ -265,6 +251,10 @@ def _every(specimen: Specimen) -> bool:
     return not (specimen.dead_end or specimen.large or specimen.keeps)
 
 
+def _always_held(specimen: Specimen) -> bool:
+    return _every(specimen) and not has_pieces(specimen.scene)
+
+
 def _large(specimen: Specimen) -> bool:
     return specimen.large
 
@@ -296,25 +286,25 @@ def _property(check: Check, of: Callable[[Specimen], bool] = _every, version: in
 PROPERTIES: Mapping[str, Property] = {
     "times": _property(sample_times),
     "unit": _property(unit_orientations),
-    "closure": _property(closure),
+    "closure": _property(closure, _always_held),
     "dead end": _property(honest_end, _dead_end),
-    "rates": _property(rates_closed),
+    "rates": _property(rates_closed, _always_held),
     "velocities": _property(velocities),
     "truth": _property(truth, version=2),
     "convergence": _property(convergence, version=2),
     "speeds": _property(true_velocities),
     "accelerations": _property(true_accelerations),
     "refined": _property(refined, _without_joints),
-    "settled": _property(settled),
+    "settled": _property(settled, _always_held),
     "digits": _property(double_precision),
     "smooth": _property(smooth),
     "start": _property(accelerations_at_start, _large),
     "alternatives": _property(alternatives_agree, _several_ways),
-    "energy": _property(energy, version=2),
+    "energy": _property(energy, _always_held, version=2),
     "momentum": _property(momentum),
     **{name: _property(check, _keeps(quantity)) for name, (check, quantity) in LAWS.items()},
     "balance": _property(balanced),
-    "workless": _property(workless),
+    "workless": _property(workless, _always_held),
     "silence": _property(silence),
     "repeated": _property(determinism, _related, version=2),
     "resampled": _property(other_times, _related, version=3),

@@ -15,6 +15,7 @@ from crosscheck.conformance.changes.copies import nudged, weighed
 from crosscheck.conformance.mechanisms.specimens import Specimen
 from crosscheck.conformance.runners import Runner
 from crosscheck.engine import Cannot, Setting
+from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.gauss_motion import NAME as GAUSS
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.metrics import error_series, in_scene_order
@@ -32,6 +33,7 @@ from crosscheck.judge.tolerances import (
 from crosscheck.judge.truth import NoSolution, closed_form, truth_for
 from crosscheck.judge.violations import violation_series
 from crosscheck.processes.pool import Observation
+from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
 
@@ -261,6 +263,14 @@ def difference(scene: Scene, first: Trajectory, second: Trajectory) -> float:
     The result is infinite if a number is not finite."""
     worst = float(error_series(scene, first, second).max())
     return worst if np.isfinite(worst) else np.inf
+
+
+def worst_body(scene: Scene, first: Trajectory, second: Trajectory) -> str:
+    """Return the name of the body whose poses differ most between two runs."""
+    turned = rotations.angle_between(first.orientation, second.orientation)
+    apart = np.linalg.norm(first.position - second.position, axis=2) / scene_length(scene)
+    worst = np.maximum(apart, turned).max(axis=0)
+    return scene.body[int(worst.argmax())].name
 
 
 def exact_motion(specimen: Specimen, times: np.ndarray) -> Trajectory:

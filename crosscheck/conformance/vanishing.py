@@ -15,16 +15,20 @@ from crosscheck.judge.tolerances import COARSEST, OWN_ACCURACY
 Measure = Callable[[int], float]
 
 
-def vanishing(bench: Bench, measure: Measure, fixed: float, remark: str = "") -> Finding:
+def vanishing(
+    bench: Bench, measure: Measure, fixed: float, remark: str = "", where: Callable[[], str] = str
+) -> Finding:
     """Return the finding on a quantity, ``measure(0)`` at the finest setting and ``measure(1)`` at the next
-    coarser one that completes.
+    coarser one that completes. ``where`` returns the joint or body at which it is largest, for a remark.
 
     The quantity may exceed the ``fixed`` limit, up to COARSEST, by what its decrease between the two
     settings leaves at the engine's order of convergence.
     """
     measured = measure(0)
     if measured <= fixed or not math.isfinite(measured) or len(bench.settings) < 2:
-        return Finding(measured, fixed, remark)
+        lost = where() if measured > fixed and math.isfinite(measured) else ""
+        return Finding(measured, fixed, "; ".join(filter(None, (remark, lost))))
+    remark = "; ".join(filter(None, (remark, where())))
     try:
         coarser = measure(1)
     except Broken:

@@ -37,9 +37,25 @@ def violation_series(scene: Scene, trajectory: Trajectory, level: int = 0) -> np
     return np.concatenate([each for each in found if each is not None]) if found[0] is not None else None
 
 
+def most_violated(scene: Scene, trajectory: Trajectory) -> str:
+    """Return the name of the joint or coupling whose residual at position level is largest; a driver counts
+    to its joint."""
+    found = _residuals(scene, trajectory, 0) or {}
+    sizes = {name: np.abs(rows).max(initial=0.0) for name, rows in found.items()}
+    return max(sizes, key=lambda name: sizes[name], default="")
+
+
 def _violations(scene: Scene, trajectory: Trajectory, level: int) -> np.ndarray | None:
     """Return ``violation_series``; above position level with angles of polynomial couplings within half a
     turn."""
+    if (found := _residuals(scene, trajectory, level)) is None:
+        return None
+    rows = [np.zeros_like(trajectory.times)[:, None], *map(np.abs, found.values())]
+    return np.concatenate(rows, axis=1).max(axis=1)
+
+
+def _residuals(scene: Scene, trajectory: Trajectory, level: int) -> dict[str, np.ndarray] | None:
+    """Return residuals (k, rows) by joint and coupling at a level, lengths over the scene's length."""
     pose = (trajectory.times, trajectory.position, trajectory.orientation)
     rates = (trajectory.velocity, trajectory.angular_velocity)
     if level == 0:
@@ -55,8 +71,7 @@ def _violations(scene: Scene, trajectory: Trajectory, level: int) -> np.ndarray 
         residuals = constraints.closure_accelerations(scene, *pose, *rates, *second)
     length = constraints.scene_length(scene)
     are_lengths = constraints.length_rows(scene)
-    scaled = [np.abs(r) / np.where(are_lengths[name], length, 1.0) for name, r in residuals.items()]
-    return np.concatenate([np.zeros_like(trajectory.times)[:, None], *scaled], axis=1).max(axis=1)
+    return {name: r / np.where(are_lengths[name], length, 1.0) for name, r in residuals.items()}
 
 
 def _sample(trajectory: Trajectory, k: int) -> Trajectory:

@@ -18,6 +18,7 @@ from crosscheck.conformance.mechanisms.random_mechanisms import null_space
 from mbref import rotations
 from mbref.scene import (
     Body,
+    Coupling,
     Driver,
     Force,
     Joint,
@@ -116,7 +117,7 @@ def spinning_loop() -> Scene:
         Spherical(name="C", bodies=("rod", "lever"), anchor=(0.65, 0.35, 0.3)),
         Revolute(name="D", bodies=("lever", "ground"), anchor=(0.8, 0.0, 0.0), axis=(-0.5, 0.3, 1.0)),
     )  # fmt: skip
-    return _launched("loop", (crank, rod, lever), joints)
+    return launched("loop", (crank, rod, lever), joints)
 
 
 def door() -> Scene:
@@ -126,7 +127,7 @@ def door() -> Scene:
         Revolute(name=name, bodies=("ground", "body"), anchor=(0.1 + h * axis).tolist(), axis=axis.tolist())
         for name, h in (("low", -0.4), ("high", 0.5))
     )
-    return _launched("door", (BODY,), hinges)
+    return launched("door", (BODY,), hinges)
 
 
 def wound_spring() -> Scene:
@@ -146,7 +147,7 @@ def floating_pair() -> Scene:
     between them."""
     springs = (_load("spring"), TorsionSpring(joint="J", stiffness=4.0, damping=0.1, natural_angle=-0.6))
     scene = Scene(name="floating", gravity=GRAVITY, duration=0.3, body=(HUB, BODY), load=springs,
-                  joint=(_between(JOINTS["revolute"]),))  # fmt: skip
+                  joint=(between(JOINTS["revolute"]),))  # fmt: skip
     twists = ((0.4, 1.0, -0.5, 1.0, -3.0, 2.0), (0.4, 1.0, -0.5, -2.0, 4.0, 3.0))
     return consistent(scene, np.array(twists))
 
@@ -158,7 +159,7 @@ def two_drivers() -> Scene:
         Driver(joint="H", polynomial=(0.0, 0.8, -0.5, 0.9, -0.3), sine=Sine(amplitude=0.2, frequency=4.0)),
         Driver(joint="J", polynomial=(0.0, -0.6), sine=Sine(amplitude=-0.3, frequency=6.0)),
     )
-    joints = (HINGE, _between(JOINTS["revolute"]))
+    joints = (HINGE, between(JOINTS["revolute"]))
     return Scene(name="drivers", gravity=GRAVITY, duration=1.5, body=(HUB, BODY), joint=joints,
                  driver=drivers)  # fmt: skip
 
@@ -178,7 +179,7 @@ def several_springs() -> Scene:
         Moment(body="hub", moment=(0.3, 0.2, -0.4)),
         Moment(body="hub", moment=(0.1, -0.2, 0.5)),
     )
-    return _launched("springs", (HUB, BODY), (BEARING, BALL), springs + pushes)
+    return launched("springs", (HUB, BODY), (BEARING, BALL), springs + pushes)
 
 
 def dampers_alone() -> Scene:
@@ -190,23 +191,23 @@ def dampers_alone() -> Scene:
         Spring(bodies=("ground", "body"), points=((0.9, -0.6, 0.4), ends[1]), stiffness=40.0,
                natural_length=0.0),
     )  # fmt: skip
-    return _launched("dampers", (HUB, BODY), (BEARING, BALL), links)
+    return launched("dampers", (HUB, BODY), (BEARING, BALL), links)
 
 
 def two_torsion_springs() -> Scene:
     """Return two successive hinges: the first with a damper only, the second with a stiff torsion spring."""
-    joints = (HINGE, _between(JOINTS["revolute"]))
+    joints = (HINGE, between(JOINTS["revolute"]))
     springs = (TorsionSpring(joint="H", stiffness=0.0, damping=0.3, natural_angle=2.0),
                TorsionSpring(joint="J", stiffness=9.0, damping=0.0, natural_angle=-0.6))  # fmt: skip
-    return _launched("torsions", (HUB, BODY), joints, springs)
+    return launched("torsions", (HUB, BODY), joints, springs)
 
 
 def light_and_heavy() -> Scene:
     """Return a light, small body on a heavy hub; the masses differ by a factor of about 1e5."""
     heavy = replaced(HUB, mass=200.0, inertia=100.0 * np.array(HUB.inertia))
     light = replaced(BODY, mass=0.00075, inertia=np.array(BODY.inertia) / 200000.0)
-    joints = (BEARING, _between(JOINTS["revolute"]))
-    return _launched("masses", (heavy, light), joints)
+    joints = (BEARING, between(JOINTS["revolute"]))
+    return launched("masses", (heavy, light), joints)
 
 
 def rounded_velocities() -> Scene:
@@ -235,28 +236,29 @@ def consistent(scene: Scene, twists: np.ndarray) -> Scene:
 def _pair(joint: Joint, driver: tuple[Driver, ...] = (), load: tuple[Load, ...] = ()) -> Scene:
     """Return ground, a hub on a ball joint, and a body on the given joint; a driver starts at the joint's
     initial coordinate."""
-    moving = _launched("pair", (HUB, BODY), (BEARING, _between(joint)), load, driver)
+    moving = launched("pair", (HUB, BODY), (BEARING, between(joint)), load, driver)
     if not driver:
         return moving
     hub, body = moving.body  # the driver determines the motion of the body relative to the hub
     return moving.with_(body=(hub, replaced(body, velocity=None, angular_velocity=None)))
 
 
-def _between(joint: Joint) -> Joint:
+def between(joint: Joint) -> Joint:
     """Return the joint between the hub and the body."""
     return replaced(joint, bodies=("hub", "body"))
 
 
-def _launched(
+def launched(
     name: str,
     bodies: tuple[Body, ...],
     joints: tuple[Joint, ...],
     loads: tuple[Load, ...] = (),
     drivers: tuple[Driver, ...] = (),
+    couplings: tuple[Coupling, ...] = (),
 ) -> Scene:
     """Return a scene whose neighbouring bodies turn in opposite directions, as their joints allow."""
     scene = Scene(name=name, gravity=GRAVITY, duration=DURATION, body=bodies, joint=joints, load=loads,
-                  driver=drivers)  # fmt: skip
+                  driver=drivers, coupling=couplings)  # fmt: skip
     sides = np.array([[1.0 if k % 2 else -0.8] for k in range(len(bodies))])
     return consistent(scene, np.tile([0.4, 0.3, -0.5, *SPIN], (len(bodies), 1)) * sides)
 
@@ -267,14 +269,14 @@ def _alone(load: tuple[Load, ...]) -> Scene:
 
 
 def _load(kind: str) -> Load:
-    between: Mapping[str, Load] = {
+    kinds: Mapping[str, Load] = {
         "moment": Moment(body="body", moment=(0.3, 0.2, -0.4)),
         "force": Force(body="body", point=(0.5, -0.1, 0.2), force=(1.0, -2.0, 3.0)),
         "spring": Spring(bodies=("hub", "body"), points=((-0.3, 0.6, 0.0), (0.4, -0.1, 0.1)), stiffness=30.0,
                          damping=0.5, natural_length=0.5),
         "torsion_spring": TorsionSpring(joint="J", stiffness=4.0, damping=0.1, natural_angle=0.4),
     }  # fmt: skip
-    return between.get(kind, LOADS[kind])
+    return kinds.get(kind, LOADS[kind])
 
 
 def _carrier(load: str) -> Joint:
