@@ -29,6 +29,7 @@ from crosscheck.judge.equations_of_motion import (
     variants,
 )
 from crosscheck.judge.gauss_principle import rank_of
+from crosscheck.judge.pieces import has_pieces
 from crosscheck.judge.tolerances import GRAINS
 from crosscheck.processes.pool import ChildFailed
 from mbref.scene import Scene
@@ -42,6 +43,7 @@ NEAR_FACTOR = 0.01  # distance from one of these factors within which a factor c
 FITS = 3  # corrections of a factor; accelerations are linear in forces, and nearly so in mass
 STEP = 1e-3  # change of a factor for the difference of accelerations
 MOST = 8  # largest number of examined failing scenes; scenes that need the fewest terms come first
+AT_EVENTS = "hint: begin with the scene {!r}, check {}; look at the times of its events and at its impacts"
 WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)  # weights of central differences of order 8
 
 
@@ -55,11 +57,13 @@ class Failure(NamedTuple):
 def hint(runner: Runner, failures: Sequence[Failure], family: str = "") -> str:
     """Return one sentence on the cause that explains most failing scenes; empty if no scene can be
     examined."""
-    ordered = sorted(failures, key=lambda failure: len(parts_of(failure.specimen.scene)))
+    always = [failure for failure in failures if not has_pieces(failure.specimen.scene)]
+    ordered = sorted(always, key=lambda failure: len(parts_of(failure.specimen.scene)))
     asked = [f for f in ordered if f.specimen.scene.has_mass() and not f.specimen.large][:MOST]
     found = [pair for failure in asked for pair in _looked_at(runner, failure, family)]
     if not found:
-        return ""
+        sometimes = [failure for failure in failures if failure not in always][:1]
+        return "".join(AT_EVENTS.format(each.specimen.scene.name, each.check) for each in sometimes)
     wrong = [(failure, changes) for failure, changes in found if changes is not None]
     first, _ = (wrong or found)[0]
     needs = ", ".join(parts_of(first.specimen.scene))
@@ -73,7 +77,12 @@ def hint(runner: Runner, failures: Sequence[Failure], family: str = "") -> str:
     known = [change for change in count if count[change] > 1 or change in certain]
     if not known:
         return f"{begin}; its accelerations are wrong, and no single term explains them"
-    best = max(known, key=lambda change: (count[change], change in certain, -PARTS.index(change[0])))
+    named = tuple(FACTORS.values())
+
+    def rank(change: tuple[str, str]) -> tuple[int, bool, bool, int]:
+        return count[change], change in certain, change[1].endswith(named), -PARTS.index(change[0])
+
+    best = max(known, key=rank)
     scenes = f"{count[best]} of {len(wrong)} scenes with wrong accelerations"
     return f"{begin}; look at the {best[0]}: {best[1]} explains {scenes}"
 

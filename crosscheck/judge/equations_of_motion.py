@@ -33,7 +33,8 @@ class Terms(NamedTuple):
     """The terms of a scene's equations at a state: M a = Σ f + Jᵀ λ, J a = γ.
 
     Mass matrix (6 nb, 6 nb) of the bodies, armatures, which add to M and f, forces (6 nb,) by name, rows
-    (m, 6 nb) with the joint of each, and the parts of γ (m,) that velocities and drivers cause.
+    (m, 6 nb) with the joint of each, and the parts of γ (m,) that velocities and drivers cause. By name of a
+    spring, the field of its natural length or coordinate, and the part of its force that this causes.
     """
 
     mass: np.ndarray
@@ -43,6 +44,7 @@ class Terms(NamedTuple):
     joints: tuple[str, ...]
     of_velocities: np.ndarray
     of_drivers: np.ndarray
+    naturals: Mapping[str, tuple[str, np.ndarray]]
 
 
 class Scaled(NamedTuple):
@@ -84,9 +86,9 @@ def terms_at(scene: Scene, motion: Trajectory, sample: int) -> Terms:
         for _ in found
     )
     mass = mass_matrix(scene, world_inertia(scene, rotations.to_matrix(orientation)))
-    return Terms(
-        mass, reflected(scene, *state[:4]), _forces(scene, t, state), rows, names, driven - moved, -driven
-    )
+    forces, naturals = _forces(scene, t, state)
+    geared = reflected(scene, *state[:4])
+    return Terms(mass, geared, forces, rows, names, driven - moved, -driven, naturals)
 
 
 def accelerations(scene: Scene, terms: Terms) -> np.ndarray:
@@ -128,11 +130,19 @@ def scaled_terms(scene: Scene, terms: Terms) -> Iterator[Scaled]:
     for kind in dict.fromkeys(load.type for load in scene.load):
         names = {_name(k, load) for k, load in enumerate(scene.load) if load.type == kind}
         yield Scaled(PARTS[3], f"every {kind}", partial(_with_forces, terms, names))
+    for load, (field, _) in terms.naturals.items():
+        yield Scaled(
+            PARTS[3], f"the {field.replace('_', ' ')} of {load}", partial(_with_natural, terms, load)
+        )
     for part, name, field in (
         (PARTS[2], "the velocity part of γ in J a = γ", "of_velocities"),
         (PARTS[5], "the drivers' accelerations in γ", "of_drivers"),
     ):
-        yield Scaled(part, name, partial(_with_multiple, terms, field))
+        yield Scaled(part, name, partial(_with_multiple, terms, field, True))
+    for coupling in scene.coupling:
+        rows = np.array([name == coupling.name for name in terms.joints])
+        name = f"the velocity part of γ of coupling {coupling.name!r}"
+        yield Scaled(PARTS[2], name, partial(_with_multiple, terms, "of_velocities", rows))
     for k, joint in enumerate(terms.armatures.joints):
         times = partial(_with_armature, terms, k)
         yield Scaled(PARTS[0], f"the armature of joint {joint!r}", times, is_armature=True)
@@ -151,8 +161,13 @@ def _with_forces(terms: Terms, names: Collection[str], factor: float) -> Terms:
     return terms._replace(forces={**terms.forces, **multiples})
 
 
-def _with_multiple(terms: Terms, field: str, factor: float) -> Terms:
-    return terms._replace(**{field: factor * getattr(terms, field)})
+def _with_multiple(terms: Terms, field: str, rows: np.ndarray | bool, factor: float) -> Terms:
+    return terms._replace(**{field: np.where(rows, factor, 1.0) * getattr(terms, field)})
+
+
+def _with_natural(terms: Terms, load: str, factor: float) -> Terms:
+    _, part = terms.naturals[load]
+    return terms._replace(forces={**terms.forces, load: terms.forces[load] + (factor - 1.0) * part})
 
 
 def _with_armature(terms: Terms, place: int, factor: float) -> Terms:
@@ -191,12 +206,16 @@ def _residuals(
     return np.concatenate([np.zeros(0), *found.values()])
 
 
-def _forces(scene: Scene, t: float, state: State) -> dict[str, np.ndarray]:
-    """Return forces and moments (6 nb,) by name: gravity, gyroscopic moments, each load and each damper."""
+def _forces(
+    scene: Scene, t: float, state: State
+) -> tuple[dict[str, np.ndarray], dict[str, tuple[str, np.ndarray]]]:
+    """Return forces and moments (6 nb,) by name: gravity, gyroscopic moments, each load and each damper; and
+    the ``naturals`` of the terms."""
     bare = scene.with_(load=[], gravity=(0.0, 0.0, 0.0))
     plain = (*state[:4], np.zeros(0))
     gyroscopic = applied(bare, t, plain).ravel()
     found = {GRAVITY: applied(scene.with_(load=[]), t, plain).ravel() - gyroscopic, GYRATION: gyroscopic}
+    naturals: dict[str, tuple[str, np.ndarray]] = {}
     springs = 0
     for k, load in enumerate(scene.load):
         turns = len(turning_loads(bare.with_(load=[load])))
@@ -205,12 +224,16 @@ def _forces(scene: Scene, t: float, state: State) -> dict[str, np.ndarray]:
         own = (*state[:4], angles)
         name = _name(k, load)
         force = applied(bare.with_(load=[load]), t, own).ravel() - gyroscopic
+        found[name] = force  # before its damping, which one state may not tell from it
+        undamped = load.model_copy(update={"damping": 0.0}) if load.is_damped else load
         if load.is_damped:
-            undamped = load.model_copy(update={"damping": 0.0})
             elastic = applied(bare.with_(load=[undamped]), t, own).ravel() - gyroscopic
-            found[f"the damping of {name}"], force = force - elastic, elastic
-        found[name] = force
-    return found
+            found |= {name: elastic, f"the damping of {name}": force - elastic}
+        for field in (field for field in type(load).model_fields if field.startswith("natural_")):
+            natural = undamped.model_copy(update={field: 0.0})
+            without = applied(bare.with_(load=[natural]), t, own).ravel() - gyroscopic
+            naturals[name] = field, found[name] - without
+    return found, naturals
 
 
 def _name(place: int, load: Load) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from crosscheck.conformance import suite, trial
 from crosscheck.conformance.hint import Failure, hint
 from crosscheck.conformance.mechanisms.specimens import specimens
 from crosscheck.conformance.runners import InProcess
@@ -108,15 +109,28 @@ def test_result_of_verify_on_a_failing_engine_has_the_hint(monkeypatch):
 
 
 class Geared(type(engine("mbref"))):
-    """mbref with a ``defect``: ``factor`` times the armatures, no coupling, or positions 0.1 mm aside."""
+    """mbref with a ``defect``: ``factor`` times the armatures, no coupling, positions 0.1 mm aside, springs
+    without natural displacements, stops with restitution², no impulses, or reactions of J alone."""
 
     def __init__(self, defect: str, factor=1.0):
         self.defect, self.factor = defect, factor
 
     def run(self, scene, times, setting):
-        joints = [j.model_copy(update={"armature": self.factor * j.armature}) for j in scene.joint]
-        changes = {"armature": {"joint": joints}, "coupling": {"coupling": ()}}.get(self.defect, {})
+        changes = {"coupling": {"coupling": ()}}.get(self.defect, {})
+        if self.defect == "armature":
+            heavier = [x.model_copy(update={"armature": self.factor * x.armature}) for x in scene.joint]
+            changes = {"joint": heavier}
+        if self.defect == "natural":
+            changes = {"load": [x.model_copy(update={"natural_displacement": 0.0}) for x in scene.load]}
+        if self.defect == "stop":
+            stop = scene.joint[0].stop.model_copy(update=self.factor)
+            changes = {"joint": [scene.joint[0].model_copy(update={"stop": stop}), *scene.joint[1:]]}
         found = super().run(scene.with_(**changes), times, setting)
+        if self.defect == "impulses":
+            still = [replace(e, impulses={n: 0 * x for n, x in e.impulses.items()}) for e in found.events]
+            return replace(found, events=tuple(still))
+        if self.defect == "reactions":
+            return replace(found, reactions={n: x * (n == "J") for n, x in found.reactions.items()})
         return replace(found, position=found.position + 1e-4) if self.defect == "output" else found
 
 
@@ -127,9 +141,33 @@ class Geared(type(engine("mbref"))):
         (("armature", 2.0), "armature pendulum", "the armature of joint 'A' counted twice explains 1 of 1"),
         (("output",), "armature pendulum", "accelerations agree with the judge's"),
         (("coupling",), "gear pair", "look at the constraints: coupling 'teeth' left out"),
+        (("natural",), "slide_spring load", "the natural displacement of load[0] (slide_spring at 'J') left"),
+        (("stop", {"restitution": 0.36}), "end stop", "look at the times of its events and at its impacts"),
     ],
 )
 def test_hint_names_a_wrong_armature_or_coupling_and_none_for_a_wrong_output(defect, scene, says):
     """`Geared` has the ``defect``. Positions that are given 0.1 mm aside leave accelerations right."""
     found = hint(InProcess(Geared(*defect), "mbref"), [Failure(KNOWN[scene], "truth")])
     assert says in found, found
+
+
+@pytest.mark.parametrize(
+    ("defect", "scene", "check", "says"),
+    [
+        (("armature", 0.0), "gears in motion", "truth", "most of 'hub'"),
+        (("armature", 0.0), "cam in motion", "truth", "most of 'body'"),
+        (("coupling",), "sum of coordinates", "closure", "most at 'sum'"),
+        (("reactions",), "gears in motion", "balance", ""),
+        (("stop", {"restitution": 0.36}), "end stop", "truth", "most of 'body'"),
+        (("impulses",), "latch", "balance", ""),
+        (("impulses",), "interval", "balance", ""),
+    ],
+)
+def test_fault_of_couplings_armatures_and_events_fails_a_check_that_the_sound_engine_passes(
+    defect, scene, check, says
+):
+    found, sound = (
+        suite.verdict_on(check, trial.set_up(InProcess(Geared(*each), "mbref"), KNOWN[scene]))
+        for each in (defect, ("",))
+    )
+    assert (found.status, sound.status) == (suite.FAIL, suite.PASS) and says in found.reason, (found, sound)
