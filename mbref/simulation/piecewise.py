@@ -179,8 +179,8 @@ def _event(
 ) -> tuple[Scene, Event]:
     """Return the scene after an event, with its velocities and without contacts, and the event.
 
-    ``piece`` is the scene before it, with these contacts; ``met_by`` are the constraints whose conditions are
-    met.
+    ``piece`` is the scene before it, with these contacts; ``met_by`` are the stops and constraints that cause
+    the event.
     """
     t = float(state.times[0])
     engaged, released = changes(scene, piece, t)
@@ -190,11 +190,11 @@ def _event(
     released += tuple(each.name for each in met_there if each.name in {*held} - {*released})
     before, after = next_piece(scene, piece, state, engaged, released)
     try:
-        met = stops.meet(in_contact(before, contacts), after, state, contacts)
+        met = stops.meet(in_contact(before, contacts), after, state, contacts, met_by)
     except SceneError as fault:
         if engaged:
             raise cannot_hold(", ".join(engaged), t, fault.faults[0]) from None
-        names = ", ".join(side.name for side in stops.touching(state))
+        names = ", ".join(side.name for side in stops.touching(state, met_by))
         raise SceneError([f"end stops {names}: cannot be met at t = {t:.6g} s: {fault.faults[0]}"]) from None
     found = met.found
     event = Event(

@@ -81,6 +81,18 @@ def ball_on_plate(restitution: float, duration: float) -> Scene:
     return ball(restitution, duration).with_(body=[plate, body("ball", 2.0, [0.1] * 3, Z)], joint=joints)
 
 
+def test_each_event_of_a_run_of_a_loose_tolerance_is_at_a_stop():
+    """The door falls by 2 rad and rebounds; errors of 1e-6 move its first end, not the number of events."""
+    motion = mbref.simulate(door(), "lm1+baumgarte", rtol=1e-6)
+    assert [event.stops for event in motion.events] == [("A.lower",)]
+
+
+def test_method_that_fails_at_once_on_redundant_rows_ends_a_scene_with_a_stop_by_its_outcome():
+    twice = [*door().joint, hinge("B", "ground", "rod", ORIGIN, Z)]
+    motion = mbref.simulate(door().with_(joint=twice), "lm1")
+    assert motion.outcome is mbref.Outcome.SINGULAR_MATRIX and not motion.times.size
+
+
 @pytest.mark.parametrize(("scene", "below"), [(ball, 0.0), (ball_on_plate, 3.0)], ids=["ground", "plate"])
 def test_bounces_without_end_become_a_contact_that_carries_the_weight(scene, below):
     """With e = 0.2 bounces end at t₀ (1 + e) / (1 - e) = 1.5 t₀. A run of 1 s leaves out flights shorter than
