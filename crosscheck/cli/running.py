@@ -23,6 +23,7 @@ from crosscheck.study.search.selection import QUICK_LIMIT, thinned
 from crosscheck.study.truths import known_at
 from crosscheck.study.words.truth import unknown
 from mbref.formats import import_options
+from mbref.records import finite
 from mbref.scene import Scene
 from mbref.terminal import Console
 
@@ -97,8 +98,9 @@ def by_scene(cases: Sequence[Case], records: Sequence[Record]) -> list[Document]
 
 
 def print_json(documents: Sequence[Document]) -> None:
-    """Print the JSON document of one scene, or a list of the documents of several scenes."""
-    print(json.dumps(documents[0] if len(documents) == 1 else documents, allow_nan=False))
+    """Print the JSON document of one scene, or a list of the documents of several scenes. Numbers that are
+    not finite become null."""
+    print(json.dumps(finite(documents[0] if len(documents) == 1 else documents), allow_nan=False))
 
 
 @contextlib.contextmanager

@@ -40,9 +40,10 @@ class Result(NamedTuple):
 def error(found: np.ndarray, exact: np.ndarray) -> float:
     """Return the largest error of eigenvalues / the largest exact one, paired for the least sum of errors.
 
-    More eigenvalues than exact ones, as of soft constraints, are left out.
+    More eigenvalues than exact ones, as of soft constraints, are left out. The error is infinite for fewer,
+    and where one is not finite.
     """
-    if len(found) < len(exact):
+    if len(found) < len(exact) or not np.isfinite(found).all():
         return float("inf")
     gaps = np.abs(np.asarray(found)[:, None] - np.asarray(exact)[None])
     pairs = linear_sum_assignment(gaps)

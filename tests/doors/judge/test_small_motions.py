@@ -1,11 +1,13 @@
 """The judge's equilibria, steady motions and eigenvalues against closed forms; engines at these poses."""
 
+import json
 from functools import cache
 
 import numpy as np
 import pytest
 
 from crosscheck.cli.commands import main
+from crosscheck.cli.running import print_json
 from crosscheck.engine import engine
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.gauss_principle import gauss
@@ -206,3 +208,13 @@ def test_modes_command_without_a_scene_prints_the_stored_records(capsys):
     """One of them is the governor's steady motion at 10 rad/s."""
     assert main(["modes"]) == 0
     assert "governor: Steady motion at 10 rad/s, stable" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("given", "off"), [([np.nan, 1j], np.inf), ([1j], np.inf), ([1j, -1j, 5.0], 0.0)])
+def test_eigenvalues_that_are_missing_or_no_numbers_have_an_infinite_error(given, off):
+    assert error(np.array(given), np.array([1j, -1j])) == off
+
+
+def test_json_document_has_null_for_numbers_that_are_not_finite(capsys):
+    print_json([{"error": np.inf, "eigenvalues": [[np.nan, 1.0]]}])
+    assert json.loads(capsys.readouterr().out) == {"error": None, "eigenvalues": [[None, 1.0]]}
