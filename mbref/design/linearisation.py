@@ -15,12 +15,20 @@ import copy
 import numpy as np
 
 from mbref.design.allowed_motions import TANGENT_RANK, ConstraintRows, by_gauss
+from mbref.design.derivatives.states import States
+from mbref.design.derivatives.tangents import (
+    MASSLESS,
+    TangentRows,
+    partition_by,
+    tangents_at,
+    with_accelerations,
+)
 from mbref.design.differences import directional_derivative
 from mbref.design.turning import TURNED_BY, UNCHANGED, Turning
 from mbref.equations.gaps import gaps
 from mbref.equations.joint_angles import angles_at, counted_from
 from mbref.equations.model import Model, displaced, displacement
-from mbref.equations.units import row_lengths
+from mbref.equations.units import row_lengths, unit_rows
 from mbref.scene import SceneError
 
 # increment of difference quotients / mechanism's length: truncation and rounding are both about 1e-13
@@ -28,6 +36,8 @@ DIFFERENCE_STEP = 0.005
 SHORT = 0.04  # factor on DIFFERENCE_STEP for differences of second order
 UNEQUAL = 1e4  # largest / least stiffness, above which errors of the largest disturb the least
 WEIGHTLESS = 1e-20  # mass along a tangent / largest mass, below which no mass resists the forces
+LIGHT = 1e3  # factor on MASSLESS, since tangents have another basis
+FEW_FREEDOMS = 4  # up to which differences cost less than the tangents, whose kernel is compiled once
 EPSILON = float(np.finfo(float).eps)
 
 
@@ -40,7 +50,7 @@ class Tangent:
 
     ``conditioning`` is the one of ``allowed_motions.Allowed``, which falls to zero towards a singular
     position.  ``angles`` (k,) of torsion springs and couplings are at q0, ``at_rest`` (n,) the accelerations
-    of bodies at rest in the frame, m/s² and rad/s².
+    of bodies at rest in the frame, m/s² and rad/s².  ``lightest`` is the least mass along the tangent / m.
     """
 
     def __init__(
@@ -51,13 +61,14 @@ class Tangent:
         self.model, self.q, self.frame = model, q, frame
         self.angles = angles_at(model, q, angles)
         with counted_from(model, self.angles):
-            terms = model.terms(0.0, q, frame.velocities(model, q))
+            self.terms = terms = model.terms(0.0, q, frame.velocities(model, q))
         self.rows: ConstraintRows = before.rows if before else ConstraintRows(model, q)
         allowed = self.rows.allowed(terms, before.basis if before else None)
         self.conditioning, free = allowed.conditioning, allowed.free
         self.weight = terms.mass * model.units**2
         squares, axes = np.linalg.eigh(free.T @ (self.weight[:, None] * free))
         self.mass = float(squares.max(initial=0.0))
+        self.lightest = float(squares.min(initial=self.mass)) / (self.mass or 1.0)
         if squares.size and not squares.min() > WEIGHTLESS * self.mass:
             raise _weightless(model, free @ axes[:, 0])
         self.at_rest = by_gauss(model, terms, allowed)
@@ -91,8 +102,8 @@ class Tangent:
         return found
 
     def coordinates(self, x: np.ndarray) -> np.ndarray:
-        """Return y (f,) of displacements or accelerations x (n,), lengths or rad."""
-        return np.asarray(self.basis.T @ (self.weight * x) / self.mass)
+        """Return y (f, …) of displacements or accelerations x (n, …), lengths or rad."""
+        return np.asarray((self.weight[:, None] * self.basis).T @ x / self.mass)
 
     def pose(self, y: np.ndarray) -> np.ndarray:
         """Return q(y) (7 nb,). Raises OffConstraints if no pose on the constraints is found."""
@@ -134,17 +145,34 @@ class Tangent:
         return self.frame.relative(self.model, self.q, still, self.at_rest) / self.model.units
 
     def slope(self, at: np.ndarray | None = None) -> np.ndarray:
-        """Return A = ∂y''/∂y (f, f) at y, by default at the pose, by differences of second order.
+        """Return A = ∂y''/∂y (f, f) at y, by default at the pose, where many freedoms have it by compiled
+        tangents; otherwise by differences of second order.
 
         The stiffest direction has the largest error, which enters softer directions. Where they are far
         softer, Richardson's extrapolation reduces it to fourth order.
         """
+        if at is None and (exact := self._exact_slope()) is not None:
+            return exact
         place = np.zeros(self.freedoms) if at is None else at
         found = self._differences(place, SHORT * DIFFERENCE_STEP)
         stiffness = np.linalg.svd(found, compute_uv=False)
         if stiffness.max(initial=0.0) > UNEQUAL * stiffness.min(initial=np.inf):
             found += (found - self._differences(place, 2 * SHORT * DIFFERENCE_STEP)) / 3
         return found
+
+    def _exact_slope(self) -> np.ndarray | None:
+        """Return A (f, f) by the variations of the equations; None for few freedoms, in a turning frame, and
+        where bodies hardly have mass or a force has no derivative."""
+        if self.freedoms <= FEW_FREEDOMS or self.frame.rate or self.lightest <= LIGHT * MASSLESS:
+            return None
+        model, none = self.model, np.zeros((1, self.model.n))
+        at_rest = States(np.zeros(1), self.q[None], none, self.angles[None], none, np.zeros((1, model.m)))
+        rows = TangentRows(
+            model, at_rest, partition_by(self.basis, unit_rows(self.terms.jacobian * model.units))
+        )
+        found = tangents_at(model, with_accelerations(at_rest, rows), rows, ()).a[0]
+        own = found[:, : self.freedoms] / model.units[:, None] @ self.basis[rows.partition.independent]
+        return self.coordinates(own) if np.isfinite(own).all() else None
 
     def _differences(self, place: np.ndarray, step: float) -> np.ndarray:
         """Return A (f, f) at y by central differences with a step, lengths or rad."""

@@ -48,8 +48,14 @@ def partition_of(model: Model, state: States) -> RowPartition:
     rows = unit_rows(terms_along(model, state).jacobian[0] * model.units)
     _, values, right = np.linalg.svd(rows, full_matrices=True)
     rank = int(np.sum(values > TANGENT_RANK * values.max(initial=0.0)))
-    independent = _pivots(right[rank:])
-    dependent = np.setdiff1d(np.arange(model.n), independent)
+    return partition_by(right[rank:].T, rows)
+
+
+def partition_by(free: np.ndarray, rows: np.ndarray) -> RowPartition:
+    """Return the partition of unit rows (m, n) and displacements, by pivots; ``free`` (n, f) spans the null
+    space of the rows."""
+    independent = _pivots(free.T)
+    dependent = np.setdiff1d(np.arange(len(free)), independent)
     return RowPartition(_pivots(rows[:, dependent].T), dependent, independent)
 
 
