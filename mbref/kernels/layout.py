@@ -54,6 +54,7 @@ class Settings(NamedTuple):
     position_gain: float = 0.0
     rank_tolerance: float = 1e-10
     newton_tolerance: float = 1e-13
+    stuck: float = 1e-10  # violation below which iterations may fail to reduce it further; m or rad
     rounding: float = 1e-15  # violation of positions below which they are not corrected
     independent: int = 0  # 1 if rows with small singular values are known to be independent
     # squared pivot of unit rows above which one solution for the accelerations suffices, without refinement

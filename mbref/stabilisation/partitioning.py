@@ -38,7 +38,6 @@ from mbref.stabilisation.euler_parameter_rates import (
     velocities_of_rates,
 )
 from mbref.stabilisation.partition_layout import Options, Scratch, options_of, scratch_of
-from mbref.stabilisation.projection import STUCK
 
 MOST_DEPENDENT_STEPS = 20  # largest number of Newton steps for the dependent coordinates
 # ratio of smallest pivots, present to new partition, above which the present one is kept; 1.1 to 1.5 gave the
@@ -182,7 +181,7 @@ def solve_dependent_coordinates(t, y, memory):
     state, scratch = memory.state, scratch_of(memory.chart)
     order, rank, b = scratch.column_order, scratch.partition.rank, scratch.residual
     system, before = memory.equations.system, inf
-    tolerance = system.settings.newton_tolerance
+    tolerance, stuck = system.settings.newton_tolerance, system.settings.stuck
     predict_dependent(t, memory)
     for i in range(order.shape[0] - rank):
         state.coordinates[order[rank + i]] = y[i]
@@ -193,7 +192,7 @@ def solve_dependent_coordinates(t, y, memory):
         )
         if not factorise_dependent(memory):
             return NOT_CONVERGED
-        if violation <= tolerance or before <= violation <= STUCK * tolerance:
+        if violation <= tolerance or before <= violation <= stuck:
             return OK
         before = violation
         system.counts.newton += 1

@@ -33,7 +33,6 @@ DEPENDENT = 3e-3  # pivot below which a row clearly depends on other rows
 CLEAR = 0.05  # pivot above which a row is clearly independent
 LEAST_REFERENCE = 0.05  # least value with which the smallest pivot is compared
 MOST_CORRECTIONS = 10  # largest number of Newton steps of a correction
-STUCK = 1e3  # violation / tolerance below which iterations may fail to reduce it further
 # violation, and its reduction by a step, below which the factor is used again
 SMALL, GOOD_REDUCTION = 1e-8, 1e-2
 BENT = 1e-6  # last correction / distance from a singular position, below which the factor is used again
@@ -180,16 +179,16 @@ def project_positions(t, memory):
     Return OK, SINGULAR if no factor exists, or NOT_CONVERGED.
     """
     system, before = memory.equations.system, inf
-    tolerance = system.settings.newton_tolerance
+    tolerance, stuck = system.settings.newton_tolerance, system.settings.stuck
     for _ in range(MOST_CORRECTIONS):
         system.counts.newton += 1
         violation = newton_step(t, before, memory)
         if violation < 0.0:
             return SINGULAR
-        if violation <= tolerance or before <= violation <= STUCK * tolerance:
+        if violation <= tolerance or before <= violation <= stuck:
             return OK
         before = violation
-    return OK if before <= STUCK * tolerance else NOT_CONVERGED
+    return OK if before <= stuck else NOT_CONVERGED
 
 
 @exchangeable(ACCEPT)

@@ -236,6 +236,7 @@ class Run:
         memory.state.velocities[:] = self.start.v
         self.ranks, settings = NO_RANKS, memory.equations.system.settings
         ranks = self.model.once(ranks_of_start, self.steps, self.limits.rank_tolerance)
+        settings.stuck *= max(1.0, self.model.length)
         settings.independent = ranks.rank == memory.pivots.size - self.links
         if self.method.stabilisation.projects:
             self.ranks = ranks

@@ -28,6 +28,14 @@ def test_built_in_scenes_complete_with_proportional_positions_at_every_size(name
     assert np.allclose(other / length, place, rtol=0.0, atol=1e-6)  # m; crossings magnify the tolerance
 
 
+@pytest.mark.parametrize("method", ["alf-dual+projection", "mpi-svd+partitioning"])
+def test_methods_that_correct_positions_complete_a_spatial_loop_of_ten_thousand_kilometres(method):
+    scene, times = find_scene("spatial_slider_crank_gravity"), [0.0, 0.2]
+    small, large = (simulate(each, method, times) for each in (scene, in_other_units(scene, 1e7, 1.0)))
+    assert large.outcome is small.outcome is Outcome.COMPLETED
+    assert large.position / 1e7 == pytest.approx(small.position, abs=1e-8)  # m, of steps with errors of 1e-9
+
+
 def rack_and_pinion() -> Scene:
     """Return a driven pinion with armature, 2 rad/s and 6 rad/s², and a rack with armature on its slide."""
     guide = {"type": "translational", "bodies": ["ground", "rack"], "anchor": (0, 0.2, 0), "axis": (1, 0, 0)}
