@@ -151,7 +151,7 @@ class Tangent:
         The stiffest direction has the largest error, which enters softer directions. Where they are far
         softer, Richardson's extrapolation reduces it to fourth order.
         """
-        if at is None and (exact := self._exact_slope()) is not None:
+        if at is None and (exact := self.exact_slope()) is not None:
             return exact
         place = np.zeros(self.freedoms) if at is None else at
         found = self._differences(place, SHORT * DIFFERENCE_STEP)
@@ -160,7 +160,7 @@ class Tangent:
             found += (found - self._differences(place, 2 * SHORT * DIFFERENCE_STEP)) / 3
         return found
 
-    def _exact_slope(self) -> np.ndarray | None:
+    def exact_slope(self) -> np.ndarray | None:
         """Return A (f, f) by the variations of the equations; None for few freedoms, in a turning frame, and
         where bodies hardly have mass or a force has no derivative."""
         if self.freedoms <= FEW_FREEDOMS or self.frame.rate or self.lightest <= LIGHT * MASSLESS:

@@ -41,6 +41,8 @@ class Linear(NamedTuple):
 def linear_at(tangent: Tangent, away: np.ndarray) -> Linear:
     """Return the equations of small motions about a pose that may be ``away`` (f,) from the equilibrium."""
     place, place_errors = _by_place(tangent)
+    if (exact := tangent.exact_slope()) is not None:
+        place_errors = place_errors + np.abs(place - exact)
     scale = tangent.rate_scale(place)
     rate, other_rate = tangent.by_rate(scale), tangent.by_rate(OTHER_STEP * scale)
     if away.any():
