@@ -107,11 +107,11 @@ def test_terms_of_a_pendulum_are_its_forces_mass_and_constraint_rows():
         "gravity",
         "the gyroscopic moments ω × Jω",
         "load[0] (force on 'b')",
-        "the damping of load[1] (torsion_spring at 'J')",
         "load[1] (torsion_spring at 'J')",
+        "the damping of load[1] (torsion_spring at 'J')",
     ]
     forces = [0, -18, 0, 0, 0, 0], [0] * 6, [0, 1.5, 0, 0, 0, 0]
-    wanted = (*forces, [0, 0, 0, 0, 0, -1.0], [0, 0, 0, 0, 0, 0.3])
+    wanted = (*forces, [0, 0, 0, 0, 0, 0.3], [0, 0, 0, 0, 0, -1.0])
     for force, expected in zip(terms.forces.values(), wanted, strict=True):
         assert force == pytest.approx(np.array(expected, dtype=float), abs=1e-14)  # N, N m
     assert np.diag(terms.mass) == pytest.approx([2, 2, 2, 0.3, 0.4, 0.5]) and terms.mass[3, 4] == 0.1

@@ -32,7 +32,8 @@ COMMANDS = {  # --help of the commands that take long
         *("export four_bar_gravity --out four_bar.xml", "list", "completion bash"),
     ],
     "crosscheck": [
-        *("list engines", f"run four_bar_gravity --engine mbref --method alf {SHORT}"),
+        # without compiled modules, its process imports for some seconds
+        *("list engines", f"run four_bar_gravity --engine mbref --method alf {SHORT} --time-limit 60"),
         *(f"compare four_bar_gravity --engine exudyn {SHORT}", "tune --help", "verify --help", "findings"),
         *("files model.xml --engine mbref", "closed-loops", "convergence", "invariants", "alternatives"),
         *(f"reference four_bar_gravity {SHORT} --out reference.csv", "judge four_bar_gravity motion.csv"),
