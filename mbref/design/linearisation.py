@@ -15,7 +15,7 @@ import copy
 import numpy as np
 
 from mbref.design.allowed_motions import TANGENT_RANK, ConstraintRows, by_gauss
-from mbref.design.derivatives.states import States
+from mbref.design.derivatives.states import state_at_rest
 from mbref.design.derivatives.tangents import (
     MASSLESS,
     TangentRows,
@@ -165,13 +165,11 @@ class Tangent:
         where bodies hardly have mass or a force has no derivative."""
         if self.freedoms <= FEW_FREEDOMS or self.frame.rate or self.lightest <= LIGHT * MASSLESS:
             return None
-        model, none = self.model, np.zeros((1, self.model.n))
-        at_rest = States(np.zeros(1), self.q[None], none, self.angles[None], none, np.zeros((1, model.m)))
-        rows = TangentRows(
-            model, at_rest, partition_by(self.basis, unit_rows(self.terms.jacobian * model.units))
-        )
+        model, at_rest = self.model, state_at_rest(self.model, self.q, self.angles)
+        partition = partition_by(self.basis, unit_rows(self.terms.jacobian * model.units))
+        rows = TangentRows(model, at_rest, partition)
         found = tangents_at(model, with_accelerations(at_rest, rows), rows, ()).a[0]
-        own = found[:, : self.freedoms] / model.units[:, None] @ self.basis[rows.partition.independent]
+        own = found[:, : self.freedoms] / model.units[:, None] @ self.basis[partition.independent]
         return self.coordinates(own) if np.isfinite(own).all() else None
 
     def _differences(self, place: np.ndarray, step: float) -> np.ndarray:

@@ -46,7 +46,8 @@ def linear_at(tangent: Tangent, away: np.ndarray) -> Linear:
     scale = tangent.rate_scale(place)
     rate, other_rate = tangent.by_rate(scale), tangent.by_rate(OTHER_STEP * scale)
     if away.any():
-        here, around = tangent.slope(), (tangent.slope(away), tangent.slope(-away))
+        here = tangent.slope() if exact is None else exact
+        around = tangent.slope(away), tangent.slope(-away)
         place_errors = place_errors + np.max([np.abs(slope - here) for slope in around], axis=0)
     rounded = tangent.pushes[:, None] * _inverse_steps(tangent)
     rate_errors = CHANGES * np.abs(rate - other_rate) + rounded / scale

@@ -107,7 +107,7 @@ def test_records_of_each_report_are_of_one_clean_commit_that_the_readme_states(g
 
 
 def test_no_stored_run_of_the_paper_timed_out_or_crashed(of_paper):
-    """Both ends are those of a process, and say nothing about a method."""
+    """Such a run shows that its process was stopped, and not what its method does."""
     ended = [label for label, r in of_paper.records.items() if r["outcome"] in ("TIMED_OUT", "CRASHED")]
     assert not ended, ended
 

@@ -18,7 +18,7 @@ from mbref.design.derivatives.sensitivities import (
     compared,
 )
 from mbref.design.derivatives.start_numbers import is_of_start
-from mbref.design.derivatives.states import Direction, States, refuse_abrupt_springs
+from mbref.design.derivatives.states import Direction, States, refuse_abrupt_springs, state_at_rest
 from mbref.design.derivatives.tangents import (
     RowPartition,
     TangentRows,
@@ -27,7 +27,6 @@ from mbref.design.derivatives.tangents import (
     with_accelerations,
 )
 from mbref.equations.initial_state import consistent_start
-from mbref.equations.model import Model
 from mbref.input_error import InputError
 from mbref.scene import Scene
 from mbref.scenes import find_scene
@@ -131,12 +130,6 @@ def moved_equilibrium(request: DerivativeRequest, step: float) -> MovedEquilibri
         each[0][:, :f] @ moved[:, :-1] + each[0][:, 2 * f :] for each in (found.x, found.multipliers)
     )
     return MovedEquilibrium(state, rows.partition, x * model.units[:, None], multipliers)
-
-
-def state_at_rest(model: Model, q: np.ndarray) -> States:
-    """Return the state (1,) at rest at coordinates q (7 nb,), without accelerations."""
-    none, angles = np.zeros((1, model.n)), np.zeros((1, len(model.structure.places.turning)))
-    return States(np.zeros(1), q[None], none, angles, none, np.zeros((1, model.m)))
 
 
 def _solved(request: DerivativeRequest, step: float) -> Derivatives:

@@ -12,10 +12,10 @@ from mbref.design.derivatives.at_rest import (
     MovedEquilibrium,
     equilibrium_request,
     moved_equilibrium,
-    state_at_rest,
 )
 from mbref.design.derivatives.numbers_of_scene import Variants, variants_of
 from mbref.design.derivatives.sensitivities import DIFFERENCE_ROUNDING, SECOND_PRECISION
+from mbref.design.derivatives.states import state_at_rest
 from mbref.design.derivatives.tangents import TangentRows, tangents_at, with_accelerations
 from mbref.equations.model import Model, displaced
 from mbref.input_error import InputError

@@ -53,6 +53,14 @@ class States(NamedTuple):
         return q
 
 
+def state_at_rest(model: Model, q: np.ndarray, angles: np.ndarray | None = None) -> States:
+    """Return the state (1,) at rest at coordinates q (7 nb,) and angles (a,), by default within half a turn,
+    without accelerations."""
+    none, near = np.zeros((1, model.n)), np.zeros((1, len(model.structure.places.turning)))
+    near = near if angles is None else angles[None]
+    return States(np.zeros(1), q[None], none, near, none, np.zeros((1, model.m)))
+
+
 def joined(parts: Sequence[StateArrays]) -> StateArrays:
     """Return all states of a sequence, or all changes, in their order."""
     return type(parts[0])(*map(np.concatenate, zip(*parts, strict=True)))
