@@ -71,8 +71,8 @@ def add_options(parser: Any) -> None:
         metavar="KINDS",
         default="",
         help="kinds of parts that may be left out although they change the motion, separated by commas:\n"
-        "armature, couplings, damping, flexible-bodies, fluid, friction, gravity-compensation, limits,\n"
-        "motors, sleep, springs, or everything; what a scene can describe stays",
+        "armature, couplings, damping, flexible-bodies, fluid, friction, gravity-compensation,\n"
+        "kinematic-links, limits, motors, sleep, springs, or everything; what a scene can describe stays",
     )
     parser.add_argument(
         "--keyframe",

@@ -168,6 +168,8 @@ class _Reader:
                 self.parts.append(Part("fluid", f"the added mass of link {own!r} in a fluid"))
         if link.find("gravity") is not None and not is_true(link.find("gravity")):
             self.parts.append(Part("gravity-compensation", f"link {own!r} without weight"))
+        if is_true(link.find("kinematic")):
+            self.parts.append(Part("kinematic-links", f"link {own!r} is kinematic: no force moves it"))
         if link.find("velocity_decay") is not None:
             self.parts.append(Part("damping", f"velocity_decay of link {own!r}"))
         centre = at.then(place)
@@ -200,7 +202,7 @@ class _Reader:
             "axes": [a.tolist() for a in axes],
         }
         if TYPES[kind] is Universal and abs(axes[0] @ axes[1]) > SQUARE:
-            raise SceneError([f"joint {name!r}: the axes of a universal joint must be perpendicular"])
+            raise SceneError([f"joint {name!r}: the axes of its type {kind} must be perpendicular"])
         made: Joint = entry(f"joint {name!r}", TYPES[kind].at, name, (first, second), **places)
         self.joints.append(made)
         if kind == "screw":

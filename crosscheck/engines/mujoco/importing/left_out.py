@@ -20,6 +20,7 @@ KINDS = {  # kinds of parts that change the motion → their description
     "fluid": "forces of a fluid around the bodies",
     "friction": "dry friction of joints and tendons",
     "gravity-compensation": "bodies whose weight is compensated",
+    "kinematic-links": "links that no force moves",
     "limits": "limits of joints and tendons that act at the start",
     "motors": "actuators that exert a force and that no load of a scene describes",
     "sleep": "bodies that begin asleep, which MuJoCo does not move",
