@@ -12,7 +12,7 @@ from mbref.scene.fields import meant as likely
 
 
 class UnknownReader(Exception):
-    """A name that is no reader's; the message lists the known ones."""
+    """A name that is no reader's; the message lists the known ones, or says why its object cannot be loaded."""
 
 
 def found_readers(
@@ -27,10 +27,7 @@ def found_readers(
     readers, left_out = list[Reader](), list[tuple[str, str]]()
     for word in names or PLACES:
         name, _, version = word.partition("==")
-        if name not in PLACES and ":" not in name:
-            known = ", ".join(PLACES)
-            raise UnknownReader(f"unknown reader {name!r}; known: {known}{likely(name, list(PLACES))}")
-        of_name = loader(name)
+        of_name = _loaded(name)
         if form not in of_name.formats:
             left_out.append((name, f"reads no {form}"))
             continue
@@ -44,6 +41,16 @@ def found_readers(
         else:
             readers.append(Reader(name, python))
     return readers, left_out
+
+
+def _loaded(name: str) -> Loader:
+    if name not in PLACES and ":" not in name:
+        known = ", ".join(PLACES)
+        raise UnknownReader(f"unknown reader {name!r}; known: {known}{likely(name, list(PLACES))}")
+    try:
+        return loader(name)
+    except (ImportError, AttributeError, TypeError, ValueError) as error:
+        raise UnknownReader(f"reader {name!r} cannot be loaded: {error}") from None
 
 
 def _requirement(of_name: Loader, version: str) -> Requirement:

@@ -106,8 +106,10 @@ def judge_motion(
         raise SceneError([f"{scene.name}: has no reference: {found.reason}"])
     compared, later = _compared(scene, recording, found, columns, tolerance)
     if not compared.is_right and not np.isin(compared.times, recording.times).all():
-        found, columns = dense_exact(scene, times, seconds, recording.columns, FINER * DENSE)
-        compared, later = _compared(scene, recording, found, columns, tolerance)
+        finer, its_columns = dense_exact(scene, times, seconds, recording.columns, FINER * DENSE)
+        if finer.motion.times.max(initial=0.0) >= found.motion.times[-1]:
+            found, columns = finer, its_columns
+            compared, later = _compared(scene, recording, found, columns, tolerance)
     return _judged(scene, recording, found, (columns, compared, later), progress)
 
 

@@ -70,13 +70,13 @@ def open_combinations(found: Iterable[Mapping[str, float]]) -> list[str]:
 def largest_numbers(columns: Mapping[str, np.ndarray], end: float) -> dict[str, float]:
     """Return the largest absolute number of each unit among columns (…) of a motion up to an end time (s).
 
-    A rate counts as at least 1 rad, or the largest length, in this time; a moment as the largest force times
-    the largest length, a power as the largest energy in this time.
+    A rate counts as at least 1 rad, or the largest length, in this time, in a shorter motion in a second; a
+    moment as the largest force times the largest length, a power as the largest energy in this time.
     """
-    found = {"rad": 1.0, "1/s": 1.0 / end if end > 0.0 else 0.0, "": 1.0}
+    found = {"rad": 1.0, "1/s": 1.0 / max(end, 1.0) if end > 0.0 else 0.0, "": 1.0}
     for name, values in columns.items():
         unit = "s" if name == "time" else UNIT_OF[quantity_of(name)]
-        found[unit] = np.max(np.abs(values), initial=found.get(unit, 0.0), where=np.isfinite(values))
+        found[unit] = float(np.max(np.abs(values), initial=found.get(unit, 0.0), where=np.isfinite(values)))
     for unit, first, second in PRODUCTS:
         found[unit] = max(found.get(unit, 0.0), found.get(first, 0.0) * found.get(second, 0.0))
     return found

@@ -22,8 +22,11 @@ PLACES: Mapping[str, str] = {  # names of loaders and their classes, in the orde
 
 
 def loader(name: str) -> Loader:
-    """Return a loader by its name; raises KeyError, or for ``module:attribute`` what its import raises."""
+    """Return a loader by its name; raises KeyError, or for ``module:attribute`` what its import raises, and
+    TypeError for another object than a class of loaders."""
     place = name if ":" in name else f"{__name__}.{PLACES[name]}"
     module, _, attribute = place.partition(":")
-    made: Loader = getattr(importlib.import_module(module), attribute)()
-    return made
+    found = getattr(importlib.import_module(module), attribute)
+    if isinstance(found, type) and issubclass(found, Loader):
+        return found()
+    raise TypeError("the object is no class derived from crosscheck.engines.loaders.loader.Loader")

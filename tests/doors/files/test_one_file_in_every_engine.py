@@ -336,9 +336,19 @@ def test_file_whose_links_are_no_tree_is_refused_in_a_sentence(tmp_path: Path, c
     assert "the links are no tree with one root: a, b" in capsys.readouterr().err
 
 
-def test_unknown_reader_of_files_is_refused_with_the_nearest_name(tmp_path: Path, capsys: Any):
-    assert main(["files", str(written(tmp_path, LOOP)), "--engine", "mojoco"]) == 2
-    assert "did you mean 'mujoco'" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("mojoco", "did you mean 'mujoco'"),
+        ("no_such_module:Reader", "cannot be loaded: No module named 'no_such_module'"),
+        ("json:Reader", "cannot be loaded: module 'json' has no attribute 'Reader'"),
+        ("json:JSONDecoder", "cannot be loaded: the object is no class derived from"),
+    ],
+)
+def test_unknown_reader_of_files_is_refused_with_its_reason(name: str, says: str, tmp_path: Path, capsys: Any):
+    """JSONDecoder is a class, and no reader of robot files."""
+    assert main(["files", str(written(tmp_path, LOOP)), "--engine", name]) == 2
+    assert says in capsys.readouterr().err
 
 
 def test_own_import_reads_public_files_of_robots_or_refuses_them_by_name():

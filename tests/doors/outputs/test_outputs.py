@@ -218,6 +218,14 @@ def test_picture_that_needs_a_missing_library_is_refused_with_the_extra_to_insta
     assert "pip install 'mbref[" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("duration", ["1e-300", "1e-14", "1e-6"])
+def test_velocities_of_a_very_short_run_are_printed(duration, capsys):
+    """The crank of the four-bar starts with -124.8 rad/s, and its coupler with 62.4 m/s."""
+    assert main(["run", "four_bar", "--duration", duration, "--samples", "2", "--estimate", "no"]) == 0
+    shown = capsys.readouterr().out
+    assert "-124.8 │" in shown and "62.4 │" in shown, shown
+
+
 def test_tables_of_many_columns_fit_80_characters_and_break_no_number(capsys):
     """19 numbers of the coupler and the energy, at three times; each table begins with the time."""
     columns = ("coupler", "energy")
