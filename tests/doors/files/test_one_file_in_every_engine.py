@@ -345,7 +345,9 @@ def test_file_whose_links_are_no_tree_is_refused_in_a_sentence(tmp_path: Path, c
         ("json:JSONDecoder", "cannot be loaded: the object is no class derived from"),
     ],
 )
-def test_unknown_reader_of_files_is_refused_with_its_reason(name: str, says: str, tmp_path: Path, capsys: Any):
+def test_unknown_reader_of_files_is_refused_with_its_reason(
+    name: str, says: str, tmp_path: Path, capsys: Any
+):
     """JSONDecoder is a class, and no reader of robot files."""
     assert main(["files", str(written(tmp_path, LOOP)), "--engine", name]) == 2
     assert says in capsys.readouterr().err

@@ -149,17 +149,19 @@ def test_equilibrium_determines_no_torque_of_a_driver_at_a_singular_position():
     assert driver.open.tolist() == [0, 0, 1, 0]
 
 
-@pytest.mark.parametrize("offset", [-1e-6, -1e-8, 1e-8, 1e-6])
-def test_parallelogram_that_stops_next_to_its_second_flat_position_turns_evenly(offset):
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_parallelogram_that_stops_next_to_its_second_flat_position_turns_evenly(side):
     """Crank and rocker turn from π/4 by ω = -124.8 rad/s, and are flat at 5π/4 rad for the second time. The
     coupler moves without turning, so that no body has an angular acceleration, and the torque is zero. It is
-    relative to m L² ω², the accelerations to ω²; 6e-9 is measured, 1e-6 allowed."""
+    relative to m L² ω², the accelerations to ω²; 3e-7 is measured, 1e-6 allowed. Rounding of the lengths
+    decides how the steps come near: of 80 times, several are hard on each processor."""
     rate = 124.8
-    motion = simulate("four_bar_quarter", times=[1.25 * np.pi / rate + offset])
-    assert motion.outcome.name == "COMPLETED", motion.message
-    assert np.abs(motion.angular_acceleration).max() <= 1e-6 * rate**2
-    size = motion.mechanism.body[0].mass * 0.5**2 * rate**2
-    assert np.abs(motion.driver("A").torque).max() <= 1e-6 * size
+    for offset in side * np.logspace(-8.7, -6.0, 80):
+        motion = simulate("four_bar_quarter", times=[1.25 * np.pi / rate + offset])
+        assert motion.outcome.name == "COMPLETED", motion.message
+        assert np.abs(motion.angular_acceleration).max() <= 1e-6 * rate**2, offset
+        size = motion.mechanism.body[0].mass * 0.5**2 * rate**2
+        assert np.abs(motion.driver("A").torque).max() <= 1e-6 * size, offset
 
 
 @pytest.mark.parametrize("times", [[0.0], [0.0, 0.01], [0.0, 1e-10, 0.01]], ids=str)
