@@ -12,7 +12,7 @@ from mbref.scene.fields import meant as likely
 
 
 class UnknownReader(Exception):
-    """A name that is no reader's; the message lists the known ones, or says why its object cannot be loaded."""
+    """A name that is no reader's; the message lists the known ones, or says why none can be loaded."""
 
 
 def found_readers(
