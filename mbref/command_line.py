@@ -111,22 +111,32 @@ def status_of(action: Callable[[], int], *refused: type[Exception]) -> int:
 def _lost_interrupts_repeated() -> Iterator[None]:
     """Repeat an interrupt that is lost because it comes while Python removes an object; elsewhere Python
     prints a traceback and goes on."""
-    before, repeated = sys.unraisablehook, list[threading.Timer]()
+    before, ended = sys.unraisablehook, threading.Event()
+
+    def repeat() -> None:
+        if not ended.wait(SOON):
+            _interrupt()
 
     def hear(lost: sys.UnraisableHookArgs) -> None:
         if not issubclass(lost.exc_type, KeyboardInterrupt):
             before(lost)
         elif signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-            repeated.append(threading.Timer(SOON, _thread.interrupt_main))
-            repeated[-1].start()
+            _thread.start_new_thread(repeat, ())  # a Thread's start waits: the interrupt would come too soon
 
     sys.unraisablehook = hear
     try:
         yield
     finally:
         sys.unraisablehook = before
-        for timer in repeated:
-            timer.cancel()
+        ended.set()
+
+
+def _interrupt() -> None:
+    """Interrupt the main thread, where it is possible by a signal, which also ends a sleep."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+    else:
+        _thread.interrupt_main()
 
 
 def _refuse(faults: Sequence[str], status: int = BAD_INPUT) -> int:
