@@ -56,6 +56,13 @@ LOADS = {
         "stiffness": 1.0,
         "natural_length": 1.0,
     },
+    "rotational_damper": {"type": "rotational_damper", "bodies": ["first", "second"], "damping": 1.0},
+    "point_damper": {
+        "type": "point_damper",
+        "bodies": ["first", "second"],
+        "point": [0.6, 0, 0.6],
+        "damping": 1.0,
+    },
     "torsion_spring": {"type": "torsion_spring", "joint": "J", "stiffness": 1.0},
     "joint_torque": {"type": "joint_torque", "joint": "J", "torque": 1.0},
 }

@@ -23,7 +23,7 @@ from crosscheck.judge.joint_loads import State, applied, turning_loads
 from crosscheck.judge.loads import mass_matrix, world_inertia
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import Force, Load, Moment, Scene, Spring
+from mbref.scene import Load, Scene
 
 GYRATION = "the gyroscopic moments ω × Jω"
 GRAVITY = "gravity"
@@ -238,7 +238,10 @@ def _forces(
 
 def _name(place: int, load: Load) -> str:
     """Return the name of a load, such as ``load[0] (moment on 'rod')``."""
-    if isinstance(load, Spring):
-        return f"load[{place}] (spring between {' and '.join(map(repr, load.bodies))})"
-    where = f"on {load.body!r}" if isinstance(load, Moment | Force) else f"at {load.joint!r}"
-    return f"load[{place}] ({load.type} {where})"
+    acting = getattr(load, load.acts_on)
+    where = {
+        "body": f"on {acting!r}",
+        "joint": f"at {acting!r}",
+        "bodies": f"between {' and '.join(map(repr, acting))}",
+    }
+    return f"load[{place}] ({load.type} {where[load.acts_on]})"

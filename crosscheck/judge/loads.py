@@ -14,7 +14,7 @@ import numpy as np
 from crosscheck.judge.constraints import inertia_matrices, initial_poses
 from crosscheck.judge.time_functions import value
 from mbref import rotations
-from mbref.scene import GROUND, Force, Moment, Scene, Spring, TorsionSpring
+from mbref.scene import GROUND, Force, Moment, PointDamper, RotationalDamper, Scene, Spring, TorsionSpring
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def wrenches(
     force = motion.position * 0 + mass[:, None] * np.array(scene.gravity)
     moment = np.zeros_like(force)
     for load in scene.load:
-        if isinstance(load, Moment | Force | Spring) or (isinstance(load, TorsionSpring) and axis.any()):
+        if type(load) in ACTIONS and (not isinstance(load, TorsionSpring) or axis.any()):
             ACTIONS[type(load)](scene, at_time(load, t, since), motion, axis, force, moment)
     return force, moment
 
@@ -98,6 +98,40 @@ def _spring(
             _push(body, motion.rotation[:, body] @ local, sign * pull, force, moment)
 
 
+def _rotational_damper(
+    scene: Scene,
+    load: RotationalDamper,
+    motion: Motion,
+    axis: np.ndarray,
+    force: np.ndarray,
+    moment: np.ndarray,
+) -> None:
+    bodies = [scene.body_index(name) for name in load.bodies]
+    first, second = (_spin(motion, body) for body in bodies)
+    for body, side in zip(bodies, (1, -1), strict=True):
+        if body >= 0:
+            moment[:, body] += side * load.damping * (second - first)
+
+
+def _point_damper(
+    scene: Scene, load: PointDamper, motion: Motion, axis: np.ndarray, force: np.ndarray, moment: np.ndarray
+) -> None:
+    bodies = [scene.body_index(name) for name in load.bodies]
+    place, rate = _point(motion, *attachment(scene, load.bodies[1], load.point))
+    first = bodies[0]
+    if first >= 0:
+        arm = place - motion.position[:, first]
+        rate = rate - motion.velocity[:, first] - cross(_spin(motion, first), arm)
+    for body, side in zip(bodies, (1, -1), strict=True):
+        if body >= 0:
+            _push(body, place - motion.position[:, body], side * load.damping * rate, force, moment)
+
+
+def _spin(motion: Motion, body: int) -> np.ndarray:
+    """Return the angular velocity (k, 3) of a body, zero of the ground."""
+    return motion.angular_velocity[:, body] if body >= 0 else 0 * motion.angular_velocity[:, 0]
+
+
 def _direction(vectors: np.ndarray) -> np.ndarray:
     """Return vectors (K, 3) of unit length, and of length zero without a direction."""
     length = np.sqrt(np.sum(vectors**2, axis=1, keepdims=True))
@@ -127,6 +161,8 @@ ACTIONS: dict[type, Callable[..., None]] = {
     Moment: _moment,
     Force: _force,
     Spring: _spring,
+    RotationalDamper: _rotational_damper,
+    PointDamper: _point_damper,
     TorsionSpring: _torsion_spring,
 }
 

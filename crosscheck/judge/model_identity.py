@@ -37,7 +37,7 @@ from crosscheck.judge.tolerances import (
 )
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import Force, Load, Moment, Scene, Spring
+from mbref.scene import Force, Load, Moment, PointDamper, RotationalDamper, Scene, Spring
 from mbref.scene.joints import ANGLE
 
 ALONG = 6  # number of samples at which the accelerations of a run are compared
@@ -159,6 +159,8 @@ def _force(load: Load, length: float, speed: float) -> float:
     if isinstance(load, Spring):
         stretch = abs(math.dist(*load.points) - load.natural_length)
         return load.stiffness * stretch + load.damping * speed
+    if isinstance(load, RotationalDamper | PointDamper):
+        return load.damping * speed / (length**2 if isinstance(load, RotationalDamper) else 1.0)
     arm, action = length if load.coordinate == ANGLE else 1.0, load.action
     resistance = action.stiffness * abs(action.natural) + action.damping * speed / arm
     return (resistance + abs(action.amount)) / arm

@@ -12,7 +12,17 @@ from crosscheck.judge.loads import attachment
 from crosscheck.judge.time_functions import value
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import Force, JointLoad, Moment, Scene, SlideSpring, Spring, TorsionSpring
+from mbref.scene import (
+    Force,
+    JointLoad,
+    Moment,
+    PointDamper,
+    RotationalDamper,
+    Scene,
+    SlideSpring,
+    Spring,
+    TorsionSpring,
+)
 from mbref.scene.joints import ANGLE
 
 ENERGIES = ("kinetic_energy", "potential_energy", "energy")
@@ -79,8 +89,24 @@ def _factor(load: Force | Moment | JointLoad, times: np.ndarray) -> np.ndarray:
     return np.ones(len(times)) if load.over_time is None else value(load.over_time, times)
 
 
-def _power(scene: Scene, load: Force | Moment, motion: Trajectory) -> np.ndarray:
-    """Return the power (k,) of a force or a moment on a body, W."""
+def _power(
+    scene: Scene, load: Force | Moment | RotationalDamper | PointDamper, motion: Trajectory
+) -> np.ndarray:
+    """Return the power (k,) of a force or a moment on a body, or of a damper between bodies, W."""
+    if isinstance(load, RotationalDamper | PointDamper):
+        first, second = (scene.body_index(name) for name in load.bodies)
+        spins = [
+            np.zeros((len(motion.times), 3)) if b < 0 else motion.angular_velocity[:, b]
+            for b in (first, second)
+        ]
+        if isinstance(load, RotationalDamper):
+            rate = spins[1] - spins[0]
+        else:
+            place, rate = _end(scene, load.bodies[1], load.point, motion)
+            if first >= 0:
+                carried = np.cross(spins[0], place - motion.position[:, first])
+                rate = rate - motion.velocity[:, first] - carried
+        return np.asarray(-load.damping * np.sum(rate**2, axis=1))
     if isinstance(load, Force):
         rate, action = _end(scene, load.body, load.point, motion)[1], load.force
     else:

@@ -7,11 +7,31 @@ from collections.abc import Mapping, Sequence
 from mbref.equations.joints import frame, unit
 from mbref.equations.parts import ORIGIN
 from mbref.equations.structure import LoadPlace
-from mbref.kernels.scene_layout import ABOUT_AXIS, ALONG_AXIS, FORCE, MOMENT, SPRING
-from mbref.scene import Force, Joint, JointLoad, Load, Moment, Scene, SceneError, Spring
+from mbref.kernels.scene_layout import (
+    ABOUT_AXIS,
+    ALONG_AXIS,
+    FORCE,
+    MOMENT,
+    POINT_DAMPER,
+    SPRING,
+    TURN_DAMPER,
+)
+from mbref.scene import (
+    Force,
+    Joint,
+    JointLoad,
+    Load,
+    Moment,
+    PointDamper,
+    RotationalDamper,
+    Scene,
+    SceneError,
+    Spring,
+)
 from mbref.scene.joints import ANGLE
 
 Values = tuple[float, ...]
+BETWEEN_BODIES = {Spring: SPRING, RotationalDamper: TURN_DAMPER, PointDamper: POINT_DAMPER}
 
 
 def loaded_joints(scene: Scene) -> dict[str, Joint]:
@@ -30,9 +50,9 @@ def load_place(
     """
     if isinstance(load, Moment | Force):
         return LoadPlace(FORCE if isinstance(load, Force) else MOMENT, index[load.body], 0, function)
-    if isinstance(load, Spring):
+    if isinstance(load, Spring | RotationalDamper | PointDamper):
         first, second = map(index.__getitem__, load.bodies)
-        return LoadPlace(SPRING, first, second, function)
+        return LoadPlace(BETWEEN_BODIES[type(load)], first, second, function)
     if not isinstance(load, JointLoad):
         raise SceneError([f"load[{place}]: mbref has no equations for loads of type {load.type!r}"])
     first, second = map(index.__getitem__, joints[load.joint].bodies)
@@ -57,6 +77,9 @@ def numbers_of_load(load: Load, joints: Mapping[str, Joint]) -> tuple[float, ...
     if isinstance(load, Spring):
         first, second = load.points
         return *ORIGIN, *first, *second, *ORIGIN, load.stiffness, load.damping, load.natural_length
+    if isinstance(load, RotationalDamper | PointDamper):
+        ends = (*load.point, *load.point) if isinstance(load, PointDamper) else ORIGIN * 2
+        return *ORIGIN, *ends, *ORIGIN, 0.0, load.damping, 0.0
     joint, action = joints[load.joint], load.action
     numbers = action.stiffness, action.damping, action.natural
     return action.amount, 0.0, 0.0, *anchors_of(joint), *unit(joint.directions[0]), *numbers

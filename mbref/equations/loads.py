@@ -11,7 +11,7 @@ from numpy import sqrt
 from mbref.equations.functions import function_value
 from mbref.equations.primitives import unwrapped_angle
 from mbref.kernels.compilation import inlined, kernel
-from mbref.kernels.scene_layout import ABOUT_AXIS, FORCE, MOMENT, SPRING
+from mbref.kernels.scene_layout import ABOUT_AXIS, ALONG_AXIS, FORCE, MOMENT, SPRING, TURN_DAMPER
 from mbref.linear_algebra.vectors import (
     accumulate,
     add,
@@ -51,8 +51,12 @@ def forces(t, equations):
             spring(k, loads, frames, g)
         elif kind == ABOUT_AXIS:
             act_about_axis(k, force[0], equations)
-        else:
+        elif kind == ALONG_AXIS:
             act_along_axis(k, force[0], loads, frames, g)
+        elif kind == TURN_DAMPER:
+            damp_rotation(k, loads, frames, g)
+        else:
+            damp_point(k, loads, frames, g)
 
 
 @kernel
@@ -69,6 +73,43 @@ def point_motion(b, s, frames):
     w = vector(frames.angular_velocity, b)
     position = add(vector(frames.position, b), to_world(frames.rotation, b, s))
     return position, add(vector(frames.velocity, b), to_world(frames.rotation, b, cross(w, s)))
+
+
+@kernel
+def spin_between(k, loads, frames):
+    """Return ω₂ - ω₁ of the bodies of load k, world."""
+    i, j, w = loads.first[k], loads.second[k], frames.angular_velocity
+    return subtract(to_world(frames.rotation, j, vector(w, j)), to_world(frames.rotation, i, vector(w, i)))
+
+
+@kernel
+def turn_apart(i, j, moment, frames, g):
+    """Add a world moment on body j and the opposite moment on body i, except on the fixed frame."""
+    if 6 * j < g.shape[0]:
+        accumulate(g, 6 * j + 3, to_body(frames.rotation, j, moment))
+    if 6 * i < g.shape[0]:
+        accumulate(g, 6 * i + 3, to_body(frames.rotation, i, scale(-1.0, moment)))
+
+
+@kernel
+def damp_rotation(k, loads, frames, g):
+    """Add the moment -damping (ω₂ - ω₁) on the second body, and the opposite moment on the first body."""
+    moment = scale(-loads.damping[k], spin_between(k, loads, frames))
+    turn_apart(loads.first[k], loads.second[k], moment, frames, g)
+
+
+@kernel
+def damp_point(k, loads, frames, g):
+    """Add -damping (v_j - v_i - ω_i × d) at a point of the second body, where d leads to it from a point of
+    the first body, and the opposite force at an equal place on the first body."""
+    i, j, rotation = loads.first[k], loads.second[k], frames.rotation
+    s_i, s_j = vector(loads.point_first, k), vector(loads.point_second, k)
+    p_i, v_i = point_motion(i, s_i, frames)
+    p_j, v_j = point_motion(j, s_j, frames)
+    d, w_i = subtract(p_j, p_i), to_world(rotation, i, vector(frames.angular_velocity, i))
+    force = scale(-loads.damping[k], subtract(subtract(v_j, v_i), cross(w_i, d)))
+    push(j, s_j, force, frames, g)
+    push(i, add(s_i, to_body(rotation, i, d)), scale(-1.0, force), frames, g)
 
 
 @kernel
@@ -110,15 +151,9 @@ def act_about_axis(k, torque, equations):
     i, j, rotation = loads.first[k], loads.second[k], frames.rotation
     axis = to_world(rotation, i, vector(loads.axis, k))
     angle = joint_angle(loads.angle[k], equations.angles[loads.angle[k]], equations)
-    w_i = to_world(rotation, i, vector(frames.angular_velocity, i))
-    w_j = to_world(rotation, j, vector(frames.angular_velocity, j))
-    rate = dot(subtract(w_j, w_i), axis)
+    rate = dot(spin_between(k, loads, frames), axis)
     resistance = loads.stiffness[k] * (angle - loads.natural[k]) + loads.damping[k] * rate
-    moment = scale(torque - resistance, axis)
-    if 6 * j < g.shape[0]:
-        accumulate(g, 6 * j + 3, to_body(rotation, j, moment))
-    if 6 * i < g.shape[0]:
-        accumulate(g, 6 * i + 3, to_body(rotation, i, scale(-1.0, moment)))
+    turn_apart(i, j, scale(torque - resistance, axis), frames, g)
 
 
 @kernel

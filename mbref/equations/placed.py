@@ -99,6 +99,8 @@ def _moved_geometry(model: Model, joint: Joint, q: np.ndarray) -> dict[str, Any]
 def _moved_points(model: Model, load: Any, q: np.ndarray) -> dict[str, Any]:
     if load.type == "force":
         return {"point": place(model, load.body, load.point, q)}
+    if load.type == "point_damper":
+        return {"point": place(model, load.bodies[1], load.point, q)}
     if load.type == "spring":
         ends = zip(load.bodies, load.points, strict=True)
         return {"points": tuple(place(model, *end, q) for end in ends)}

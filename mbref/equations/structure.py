@@ -15,7 +15,7 @@ import numpy as np
 
 from mbref.equations.joints import ROWS_OF
 from mbref.equations.machine_memory import refuse_beyond_memory
-from mbref.kernels.scene_layout import ALONG_AXIS, COUPLED_ANGLE, FORCE, NO_SLIP, SPRING
+from mbref.kernels.scene_layout import ALONG_AXIS, COUPLED_ANGLE, FORCE, NO_SLIP, POINT_DAMPER, SPRING
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -287,6 +287,7 @@ def _of_vectors(bodies: Sequence[Sequence[int]]) -> np.ndarray:
 def _origins(load: LoadPlace, nb: int) -> tuple[int, ...]:
     """Return the bodies from whose centres of mass the vectors of a load are measured: two points, then
     an axis."""
-    first = load.first if load.kind in (FORCE, SPRING, ALONG_AXIS) else nb
-    second = load.second if load.kind in (SPRING, ALONG_AXIS) else nb
+    between_points = load.kind in (SPRING, ALONG_AXIS, POINT_DAMPER)
+    first = load.first if between_points or load.kind == FORCE else nb
+    second = load.second if between_points else nb
     return first, second, nb

@@ -21,7 +21,7 @@ from mbref.equations.varied_vectors import (
     product_motion,
 )
 from mbref.kernels.compilation import kernel
-from mbref.kernels.scene_layout import ABOUT_AXIS, FORCE, MOMENT, SPRING
+from mbref.kernels.scene_layout import ABOUT_AXIS, FORCE, MOMENT, POINT_DAMPER, SPRING, TURN_DAMPER
 from mbref.linear_algebra.vectors import accumulate, add, cross, dot, scale, subtract, to_body, vector
 
 
@@ -132,6 +132,52 @@ def vary_spring(k, t, freedoms, varied, numbers, equations):
 
 
 @kernel
+def spin_change(b, d, varied):
+    """Return the change of the angular velocity of body b along direction d."""
+    turned = cross(entry_vector(varied.turn, d, b), vector(varied.spin, b))
+    return add(turned, entry_vector(varied.twist, d, b))
+
+
+@kernel
+def vary_turn_damper(k, freedoms, varied, numbers, equations):
+    """Add the changes of damping (ω₂ - ω₁), minus the moment on the second body."""
+    loads = equations.scene.loads
+    i, j = loads.first[k], loads.second[k]
+    apart = subtract(vector(varied.spin, j), vector(varied.spin, i))
+    add_moment(i, j, scale(loads.damping[k], apart), varied)
+    for d in range(varied.x.shape[0]):
+        n = d - 2 * freedoms
+        change = scale(loads.damping[k], subtract(spin_change(j, d, varied), spin_change(i, d, varied)))
+        if n >= 0:
+            change = add(change, scale(numbers.loads.damping[n, k], apart))
+        add_moment_change(i, j, d, change, varied)
+
+
+@kernel
+def vary_point_damper(k, freedoms, varied, numbers, equations):
+    """Add the changes of damping times the velocity of a point as seen from the first body, minus the force
+    on the second body."""
+    loads, changes = equations.scene.loads, numbers.loads
+    i, j, damping = loads.first[k], loads.second[k], loads.damping[k]
+    u = fixed_vector(i, vector(loads.point_first, k), varied, equations)
+    v = fixed_vector(j, vector(loads.point_second, k), varied, equations)
+    between, spin = between_points(i, j, u, v, varied, equations), vector(varied.spin, i)
+    seen = subtract(between[1], cross(spin, between[0]))
+    force, arms = scale(damping, seen), (add(u[0], between[0]), v[0])
+    add_opposite_forces(i, j, u[0], v[0], between[0], force, varied)
+    for d in range(varied.x.shape[0]):
+        n = d - 2 * freedoms
+        du = changed_vector(i, d, 1, u, changes.point_first, k, n, varied, equations)
+        dv = changed_vector(j, d, 1, v, changes.point_second, k, n, varied, equations)
+        gap = between_changes(i, j, d, du, dv, varied)
+        carried = add(cross(spin_change(i, d, varied), between[0]), cross(spin, gap[0]))
+        moved = scale(damping, subtract(gap[1], carried))
+        if n >= 0:
+            moved = add(moved, scale(changes.damping[n, k], seen))
+        add_change_of_forces(i, j, d, arms, (add(du[0], gap[0]), dv[0]), force, moved, varied)
+
+
+@kernel
 def vary_torque(k, t, freedoms, varied, numbers, equations):
     """Add the changes of minus the moments about the axis of a joint."""
     loads, turning, changes = equations.scene.loads, equations.scene.turning, numbers.loads
@@ -154,19 +200,29 @@ def vary_torque(k, t, freedoms, varied, numbers, equations):
         du = changed_vector(second, d, 0, u, numbers.turning.x_second, s, n, varied, equations)[0]
         da = changed_vector(i, d, 0, a, changes.axis, k, n, varied, equations)[0]
         more = cosine * (dot(du, y[0]) + dot(u[0], dy)) - sine * (dot(du, x[0]) + dot(u[0], dx))
-        of_i = add(
-            cross(entry_vector(varied.turn, d, i), vector(varied.spin, i)), entry_vector(varied.twist, d, i)
-        )
-        of_j = add(
-            cross(entry_vector(varied.turn, d, j), vector(varied.spin, j)), entry_vector(varied.twist, d, j)
-        )
-        faster = dot(subtract(of_j, of_i), a[0]) + dot(apart, da)
+        faster = dot(subtract(spin_change(j, d, varied), spin_change(i, d, varied)), a[0]) + dot(apart, da)
         if n >= 0:
             change = load_change(k, n, t, numbers, equations)[1][0]
             change -= changes.stiffness[n, k] * (angle - loads.natural[k])
             change += loads.stiffness[k] * changes.natural[n, k] - changes.damping[n, k] * rate
         change -= loads.stiffness[k] * more / square + loads.damping[k] * faster
         add_moment_change(i, j, d, scale(-1.0, add(scale(change, a[0]), scale(size, da))), varied)
+
+
+@kernel
+def vary_load(k, t, freedoms, varied, numbers, equations):
+    """Add the changes of minus the forces and moments of load k."""
+    kind = equations.scene.loads.kind[k]
+    if kind in (MOMENT, FORCE):
+        vary_force(k, t, freedoms, varied, numbers, equations)
+    elif kind == ABOUT_AXIS:
+        vary_torque(k, t, freedoms, varied, numbers, equations)
+    elif kind == TURN_DAMPER:
+        vary_turn_damper(k, freedoms, varied, numbers, equations)
+    elif kind == POINT_DAMPER:
+        vary_point_damper(k, freedoms, varied, numbers, equations)
+    else:
+        vary_spring(k, t, freedoms, varied, numbers, equations)
 
 
 @kernel
@@ -178,13 +234,7 @@ def vary_forces(t, freedoms, varied, numbers, equations):
     scene, frames = equations.scene, equations.frames
     loads, mass, inertia = scene.loads, scene.bodies.mass, scene.bodies.inertia
     for k in range(loads.kind.shape[0]):
-        kind = loads.kind[k]
-        if kind in (MOMENT, FORCE):
-            vary_force(k, t, freedoms, varied, numbers, equations)
-        elif kind == ABOUT_AXIS:
-            vary_torque(k, t, freedoms, varied, numbers, equations)
-        else:
-            vary_spring(k, t, freedoms, varied, numbers, equations)
+        vary_load(k, t, freedoms, varied, numbers, equations)
     for d in range(varied.x.shape[0]):
         n, wrench = d - 2 * freedoms, varied.wrench[d]
         for b in range(mass.shape[0]):

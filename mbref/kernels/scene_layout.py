@@ -12,7 +12,8 @@ from mbref.kernels.named_memory import IndexTable, Indices, Matrix, Vector
 
 # kinds of primitive constraints
 POINT, DOT1, DOT2, DISTANCE, COUPLED_ANGLE, COUPLED_SLIDE, CONTACT, NO_SLIP = range(8)
-MOMENT, FORCE, SPRING, ABOUT_AXIS, ALONG_AXIS = range(5)  # kinds of loads; the last two: of joints
+# kinds of loads: on a body, between points, of a joint's coordinate, and against relative rotation and motion
+MOMENT, FORCE, SPRING, ABOUT_AXIS, ALONG_AXIS, TURN_DAMPER, POINT_DAMPER = range(7)
 
 
 class Bodies(NamedTuple):

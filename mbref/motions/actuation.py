@@ -9,7 +9,18 @@ import numpy as np
 from mbref.motions.driving_forces import driving_forces
 from mbref.motions.joint_motion import along, angular_velocity_of, joint_motion, position_of, velocity_of
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import Force, JointLoad, Moment, Scene, SlideSpring, Spring, TorsionSpring
+from mbref.rotations import cross
+from mbref.scene import (
+    Force,
+    JointLoad,
+    Moment,
+    PointDamper,
+    RotationalDamper,
+    Scene,
+    SlideSpring,
+    Spring,
+    TorsionSpring,
+)
 from mbref.scene.bodies import DRIVER
 from mbref.scene.joints import ANGLE
 from mbref.scene.loads import LoadEntry
@@ -116,6 +127,9 @@ def load_motion(scene: Scene, motion: Trajectory, place: int) -> LoadMotion:
         return _spring(scene, motion, place, load)
     if isinstance(load, JointLoad):
         return _of_joint(scene, motion, place, load)
+    if isinstance(load, RotationalDamper | PointDamper):
+        rates = _seen(scene, motion, load)
+        return LoadMotion(place, power=-load.damping * np.einsum("ki,ki->k", rates, rates))
     return LoadMotion(place, power=factor_of(load, motion) * _power_of_constant(scene, motion, load))
 
 
@@ -131,6 +145,17 @@ def _power_of_constant(scene: Scene, motion: Trajectory, load: Force | Moment) -
     if isinstance(load, Force):
         return velocity_of(scene, motion, load.body, load.point) @ np.array(load.force)
     return angular_velocity_of(scene, motion, load.body) @ np.array(load.moment)
+
+
+def _seen(scene: Scene, motion: Trajectory, load: RotationalDamper | PointDamper) -> np.ndarray:
+    """Return the angular velocity (k, 3) of a damper's second body, or the velocity of its point, as seen
+    from the first body, world axes."""
+    first, second = load.bodies
+    if isinstance(load, RotationalDamper):
+        return angular_velocity_of(scene, motion, second) - angular_velocity_of(scene, motion, first)
+    apart = position_of(scene, motion, second, load.point) - position_of(scene, motion, first, load.point)
+    velocity = velocity_of(scene, motion, second, load.point) - velocity_of(scene, motion, first, load.point)
+    return np.asarray(velocity - cross(angular_velocity_of(scene, motion, first), apart))
 
 
 def _of_joint(scene: Scene, motion: Trajectory, place: int, load: JointLoad) -> LoadMotion:

@@ -44,6 +44,7 @@ OTHER_WORDS = {  # words of other programs and books → the words of scene file
     "linear_spring": "slide_spring",
     "spring_damper": "spring",
     "rotational_spring": "torsion_spring",
+    "damper": "point_damper",
     "world": "ground",
     "frame": "ground",
     "base": "ground",

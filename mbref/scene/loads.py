@@ -85,6 +85,26 @@ class Spring(LoadEntry):
         return length
 
 
+class RotationalDamper(LoadEntry):
+    """Moment -damping (ω₂ - ω₁) on the second body, the opposite on the first; N m s/rad."""
+
+    acts_on = "bodies"
+    type: Literal["rotational_damper"] = "rotational_damper"
+    bodies: Pair
+    damping: TorsionalDamping
+
+
+class PointDamper(LoadEntry):
+    """Force -damping v at a point of the second body (world at t = 0), the opposite on the first body at the
+    same place; v is the velocity of the point as seen from the first body; N s/m."""
+
+    acts_on = "bodies"
+    type: Literal["point_damper"] = "point_damper"
+    bodies: Pair
+    point: PointValue
+    damping: Damping
+
+
 class Action(NamedTuple):
     """Force or torque ``amount`` - stiffness (q - natural) - damping q' along a joint coordinate q.
 
@@ -152,7 +172,16 @@ class JointForce(JointLoad):
 
 
 Load = Annotated[
-    Moment | Force | Spring | TorsionSpring | SlideSpring | JointTorque | JointForce, Discriminator("type")
+    Moment
+    | Force
+    | Spring
+    | RotationalDamper
+    | PointDamper
+    | TorsionSpring
+    | SlideSpring
+    | JointTorque
+    | JointForce,
+    Discriminator("type"),
 ]
 LOAD_TYPES: dict[str, type[Load]] = {
     load.model_fields["type"].default: load for load in get_args(get_args(Load)[0])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +15,9 @@ from mbref.kernels.scene_layout import (
     COUPLED_ANGLE,
     FORCE,
     MOMENT,
+    POINT_DAMPER,
     SPRING,
+    TURN_DAMPER,
     Loads,
     SceneData,
 )
@@ -142,7 +145,7 @@ def torsions_of(data: SceneData, forms: Forms, angles: Sequence[tuple[Any, ...]]
 
 
 def slides_of(data: SceneData, forms: Forms, displacements: Sequence[tuple[Any, ...]]) -> Slides:
-    """Return the loads along joints' axes, then the coupled displacements."""
+    """Return the loads along joints' axes, then the dampers between bodies and the coupled displacements."""
     of, rows, loads = forms.of, [], data.loads
     places, powers = np.flatnonzero(loads.kind == ALONG_AXIS), data.primitives.higher.shape[-1] + 1
     for k in places:
@@ -151,13 +154,32 @@ def slides_of(data: SceneData, forms: Forms, displacements: Sequence[tuple[Any, 
         ends = of.point(first, loads.point_first[k]), of.point(second, loads.point_second[k])
         numbers = loads.stiffness[k], loads.damping[k], loads.natural[k] / of.length
         rows.append((*_along(forms, axis, ends), *numbers, loads.function[k], -1, *[0.0] * powers))
+    rows += [(*each, 0.0, -1, -1, *[0.0] * powers) for each in _dampers(loads, forms)]
     rows += displacements
     constant, form, stiffness, damping, natural, *others = _stacked(rows, 6, forms.d, 5 + powers)
     amount = loads.force[..., places, 0] / of.length
-    amount = np.concatenate([amount, np.zeros((*amount.shape[:-1], len(displacements)))], axis=-1)
+    amount = np.concatenate([amount, np.zeros((*amount.shape[:-1], len(rows) - len(places)))], axis=-1)
     function, row = (number.astype(np.int64) for number in others[:2])
     law = np.stack(others[2:], axis=-1)
     return Slides(constant, form, stiffness, damping, natural, amount, function, row, law)
+
+
+def _dampers(loads: Loads, forms: Forms) -> Iterator[tuple[Any, ...]]:
+    """Yield constants, forms, no stiffness and damping of scalar products q = a · d that resist as dampers
+    between bodies do, by -damping q'.
+
+    A point damper acts along each axis a of the first body. A rotational damper c has the dissipation
+    ½ c (ω₂ - ω₁)² = ¼ c Σ q'², where q are the products of each axis of the first and of the second body.
+    """
+    of = forms.of
+    for k in np.flatnonzero(loads.kind == POINT_DAMPER):
+        first, second = int(loads.first[k]), int(loads.second[k])
+        ends = of.point(first, loads.point_first[k]), of.point(second, loads.point_second[k])
+        for axis in forms.axes(first):
+            yield *_along(forms, axis, ends), 0.0, loads.damping[k]
+    for k in np.flatnonzero(loads.kind == TURN_DAMPER):
+        for pair in product(forms.axes(int(loads.first[k])), forms.axes(int(loads.second[k]))):
+            yield *forms([e for axis in pair for e in axis]), 0.0, 0.5 * loads.damping[k] / of.length**2
 
 
 def timed_forces(loads: Loads, forms: Forms) -> TimedForces:

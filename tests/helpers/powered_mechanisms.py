@@ -8,7 +8,7 @@ import numpy as np
 from crosscheck.conformance.mechanisms.geared import geared_mechanism
 from crosscheck.conformance.mechanisms.parts import triple
 from crosscheck.conformance.mechanisms.random_mechanisms import null_space
-from crosscheck.conformance.mechanisms.random_scenes import REGULAR, with_loads_of_joints
+from crosscheck.conformance.mechanisms.random_scenes import REGULAR, with_dampers, with_loads_of_joints
 from crosscheck.judge.gauss_principle import goes_on, rank, rank_of, singular_values
 from mbref.scene import Body, Coupling, Driver, Joint, Revolute, Scene, Sine, TorsionSpring, Translational
 
@@ -27,7 +27,7 @@ def powered_mechanism(seed: int) -> Scene:
     drivers, where its freedoms allow them; of two mechanisms one has a point mass on a massless link and a
     slide with armature, and one the ground as a body. The result depends on the seed only."""
     rng = np.random.default_rng([seed, 11])
-    scene = with_loads_of_joints(geared_mechanism(seed), seed, switched=False)
+    scene = with_dampers(with_loads_of_joints(geared_mechanism(seed), seed, switched=False), seed)
     if seed % 2:
         scene = _with_gimbal(scene, rng)
     scene = scene.with_(

@@ -48,6 +48,8 @@ def started(scene: Scene, motion: Trajectory, sample: int, sense: float, duratio
             loads.append(replaced(load, points=[point.tolist() for point in points]))
         elif load.type == "force":
             loads.append(replaced(load, point=carry.point(load.body, load.point)))
+        elif load.type == "point_damper":
+            loads.append(replaced(load, point=carry.point(load.bodies[1], load.point)))
         else:
             loads.append(load)
     loads = [replaced(load, factor=_shifted(load.over_time, t)) if load.over_time else load for load in loads]

@@ -65,7 +65,8 @@ def in_other_units(scene: Scene, length: float, time: float) -> Scene:
         coupling=tuple(_coupled_in_lengths(scene, coupling, length) for coupling in scene.coupling),
         driver=tuple(_slower(d, length if d.joint in slides else 1.0, time) for d in scene.driver),
         load=tuple(
-            mapped(x, {**loads, **(turning if x.type == "torsion_spring" else linear)}) for x in scene.load
+            mapped(x, {**loads, **(turning if x.type in ("torsion_spring", "rotational_damper") else linear)})
+            for x in scene.load
         ),
     )
 

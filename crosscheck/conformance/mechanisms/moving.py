@@ -24,7 +24,9 @@ from mbref.scene import (
     Joint,
     Load,
     Moment,
+    PointDamper,
     Revolute,
+    RotationalDamper,
     Scene,
     Sine,
     Spherical,
@@ -274,6 +276,8 @@ def _load(kind: str) -> Load:
         "force": Force(body="body", point=(0.5, -0.1, 0.2), force=(1.0, -2.0, 3.0)),
         "spring": Spring(bodies=("hub", "body"), points=((-0.3, 0.6, 0.0), (0.4, -0.1, 0.1)), stiffness=30.0,
                          damping=0.5, natural_length=0.5),
+        "rotational_damper": RotationalDamper(bodies=("hub", "body"), damping=0.06),
+        "point_damper": PointDamper(bodies=("hub", "body"), point=(0.5, -0.1, 0.2), damping=0.8),
         "torsion_spring": TorsionSpring(joint="J", stiffness=4.0, damping=0.1, natural_angle=0.4),
     }  # fmt: skip
     return kinds.get(kind, LOADS[kind])

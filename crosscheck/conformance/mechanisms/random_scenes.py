@@ -30,7 +30,9 @@ from mbref.scene import (
     JointForce,
     JointTorque,
     Load,
+    PointDamper,
     Revolute,
+    RotationalDamper,
     Scene,
     Sine,
     SlideSpring,
@@ -101,6 +103,19 @@ def with_loads_of_joints(scene: Scene, seed: int, switched: bool = False) -> Sce
             )
             loads.append(JointForce(joint=joint.name, force=force, factor=_factor(rng, switched)))
     return scene.with_(load=tuple(loads))
+
+
+def with_dampers(scene: Scene, seed: int) -> Scene:
+    """Return the scene with a damper of the rotation between two bodies, and one of a point of a body."""
+    rng = np.random.default_rng([seed, 5])
+    first, second = rng.permutation([body.name for body in scene.body])[:2].tolist()
+    turning, moving = rng.uniform((0.05, 0.5), (0.2, 2.0)).tolist()
+    point = triple(rng.uniform(-1.0, 1.0, 3))
+    dampers = (
+        RotationalDamper(bodies=(first, second), damping=turning),
+        PointDamper(bodies=(GROUND, second), point=point, damping=moving),
+    )
+    return scene.with_(load=(*scene.load, *dampers))
 
 
 def _factor(rng: np.random.Generator, switched: bool) -> Factor:

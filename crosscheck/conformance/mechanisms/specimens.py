@@ -11,7 +11,7 @@ from crosscheck.conformance.mechanisms.features import feature_scenes
 from crosscheck.conformance.mechanisms.invariant import flying_ring, whirling_crank
 from crosscheck.conformance.mechanisms.large_graphs import large_graph
 from crosscheck.conformance.mechanisms.moving import dead_end, moving_probes
-from crosscheck.conformance.mechanisms.random_scenes import mechanism
+from crosscheck.conformance.mechanisms.random_scenes import mechanism, with_dampers
 from crosscheck.judge.reference.reference import SECONDS
 from mbref.scene import Scene
 from mbref.scenes import SCENES
@@ -24,10 +24,11 @@ SHORT = {  # built-in scenes with a truth, and end times (s) before their first 
     "spatial_slider_crank_driven": 0.02,
 }
 DRAWN = {"drawn loop": 0, "drawn driven loop": 1}  # seeds of the random mechanisms that belong to the suite
+DAMPED = 8  # seed of the random mechanism with dampers between bodies
 GRAPHS = (11, 0, 5)  # seeds of the large mechanisms that belong to the suite, of 13, 31 and 78 bodies
 RELATED = (  # scenes to which the metamorphic relations are applied at quick depth
     "pendulum", "torsion", "oscillator", "driven", "turntable", "four_bar_gravity", "spinning loop",
-    "cylindrical driver", "force load", "tumbling body", *DRAWN,
+    "cylindrical driver", "force load", "tumbling body", *DRAWN, "drawn damped loop",
 )  # fmt: skip
 
 
@@ -55,6 +56,7 @@ def specimens(deep: bool = False) -> tuple[Specimen, ...]:
     scenes = [SCENES[name]().with_(duration=end) for name, end in SHORT.items()]
     features = {n: s.with_(name=n) for n, s in feature_scenes().items() if s.name not in SHORT}
     drawn = [mechanism(seed).with_(name=name) for name, seed in DRAWN.items()]
+    drawn.append(with_dampers(mechanism(DAMPED), DAMPED).with_(name="drawn damped loop"))
     scenes += [*(features | moving_probes()).values(), *drawn]
     forms += [Specimen(scene, None, deep or scene.name in RELATED) for scene in scenes]
     geared = [Specimen(*make()) for make in GEARED]

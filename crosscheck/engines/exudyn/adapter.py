@@ -30,7 +30,7 @@ from crosscheck.linearising import Linearising
 from crosscheck.setting import unknown_family
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import Driver, Scene
+from mbref.scene import GROUND, Driver, PointDamper, Scene
 
 STEPS = (100, 400, 1600, 6400, 25600)  # numbers of steps over a scene's duration
 TUNED_STEPS = (0.4, 0.15, 0.05, 0.015, 0.006)  # rad turned per step
@@ -87,6 +87,10 @@ class Exudyn(Linearising, Engine):
             return Cannot(
                 Owner.MODEL, "without masses only a mechanism whose whole motion is driven can be analysed"
             )
+        for k, load in enumerate(scene.load):
+            if isinstance(load, PointDamper) and load.bodies[0] != GROUND:
+                why = f"load[{k}] damps a point as seen from the moving body {load.bodies[0]!r}"
+                return Cannot(Owner.ENGINE, f"{why}; Exudyn's connector leaves out the body's rotation")
         return unended_piece(scene)
 
     def serves(self, scene: Scene, family: str) -> bool:

@@ -8,6 +8,7 @@ matrix ill-conditioned at small steps.  The functions take the exudyn module and
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -242,6 +243,23 @@ class _Parts:
             offset=load.natural_displacement,
         )
         self.mbs.AddObject(spring)
+
+    def _rotational_damper(self, load: Any) -> None:
+        self._resist(load, [self.position[body] for body in load.bodies], slice(3, 6))
+
+    def _point_damper(self, load: Any) -> None:
+        self._resist(load, [load.point] * 2, slice(0, 3))
+
+    def _resist(self, load: Any, points: Sequence[Any], components: slice) -> None:
+        """Add damping of components of the relative motion of two markers."""
+        damping = np.zeros((6, 6))
+        damping[components, components] = load.damping * np.eye(3)
+        markers = [self.marker(*end) for end in zip(load.bodies, points, strict=True)]
+        self.mbs.AddObject(
+            self.items.ObjectConnectorRigidBodySpringDamper(
+                markerNumbers=markers, stiffness=np.zeros((6, 6)), damping=damping
+            )
+        )
 
     def _joint_torque(self, load: Any) -> None:
         self._push(load, self._rotation(self.scene.joint_named(load.joint)), load.torque)

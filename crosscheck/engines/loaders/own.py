@@ -35,7 +35,7 @@ from crosscheck.engines.mujoco.importing.reading import source
 from crosscheck.judge.small_motions.posed import posed as restarted
 from mbref import formats, rotations
 from mbref.motions.trajectory import Outcome, Trajectory
-from mbref.scene import GROUND, Scene, SlideSpring, TorsionSpring
+from mbref.scene import GROUND, RotationalDamper, Scene, SlideSpring, TorsionSpring
 from mbref.scene import Joint as AnyJoint
 
 EVERYTHING = ("everything",)
@@ -136,7 +136,8 @@ class Imported(Loaded):
             )
         free = [body.name for body in self.scene.body if end(body.name) != end(GROUND)]
         bases = dict.fromkeys(map(end, free))
-        return [*(Joint(f"{n} free", "free", (WORLD, n)) for n in bases), *tree], loops
+        damped = {n: coefficients(sum(x.damping for x in self._dampers((GROUND, n)))) for n in bases}
+        return [*(Joint(f"{n} free", "free", (WORLD, n), damping=damped[n]) for n in bases), *tree], loops
 
     def _rods(self) -> dict[str, str]:
         """Return planar joints with the distance joint of the same bodies: two parallel hinges of a massless
@@ -170,11 +171,17 @@ class Imported(Loaded):
         kinds = TorsionSpring | SlideSpring
         return [load for load in self.scene.load if isinstance(load, kinds) and load.joint == joint.name]
 
+    def _dampers(self, bodies: tuple[str, str]) -> list[RotationalDamper]:
+        """Return the dampers of all rotation between two bodies."""
+        found = (load for load in self.scene.load if isinstance(load, RotationalDamper))
+        return [load for load in found if load.bodies == bodies]
+
     def _numbers(self, joint: AnyJoint, springs: Sequence[TorsionSpring | SlideSpring]) -> dict[str, Any]:
         """Return the numbers of a joint with springs; a scene has neither limits nor dry friction."""
         stiffness = coefficients(sum(spring.stiffness for spring in springs))
+        dampers = self._dampers(joint.bodies) if joint.type == "spherical" else []
         found: dict[str, Any] = {
-            "damping": coefficients(sum(spring.damping for spring in springs)),
+            "damping": coefficients(sum(each.damping for each in (*springs, *dampers))),
             "stiffness": stiffness,
             "armature": joint.reflected_inertia,
             "friction": 0.0,

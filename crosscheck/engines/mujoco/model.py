@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.mujoco import dampers
 from crosscheck.engines.shared.driver_motion import motion
 from crosscheck.engines.shared.everything import EVERYTHING
 from crosscheck.engines.shared.initial_velocities import initial_rates
@@ -40,6 +41,8 @@ from mbref.scene import (
     Joint,
     JointLoad,
     Moment,
+    PointDamper,
+    RotationalDamper,
     Scene,
     Spring,
 )
@@ -253,8 +256,23 @@ class _Builder:
             self._force(k, load)
         elif isinstance(load, Spring):
             self._spring(k, load)
+        elif isinstance(load, RotationalDamper | PointDamper):
+            self._damper(k, load)
         else:
             self._along(load)
+
+    def _damper(self, k: int, load: RotationalDamper | PointDamper) -> None:
+        """Add damping to the tree's joint between the bodies, or actuators between sites."""
+        turning = dampers.turning_joints(self.scene, self.tree, load)
+        for i in turning:
+            self.joint[i].damping[0] += load.damping
+        if not turning:
+            points = dampers.points_of(load, [self.centre(self.link_of(body)) for body in load.bodies])
+            ends = [
+                self.site(self.link_of(body), np.array(point), f"damper {k}.{i}")
+                for i, (body, point) in enumerate(zip(load.bodies, points, strict=True))
+            ]
+            dampers.add_actuators(self.mujoco, self.spec, f"damper {k}", ends, load)
 
     def _along(self, load: JointLoad) -> None:
         """Add spring, damper and force along a joint coordinate."""

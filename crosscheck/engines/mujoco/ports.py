@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Cannot, Owner, Setting
+from crosscheck.engines.mujoco import dampers
 from crosscheck.engines.mujoco.families import STIFFEST
 from crosscheck.engines.mujoco.model import SUPPORTS as OF_MUJOCO
 from crosscheck.engines.mujoco.model import compiled
@@ -63,7 +64,7 @@ class Port(SteppingEngine):
         if scene.driver:
             driven = f"the driver of joint {scene.driver[0].joint!r}"
             return Cannot(Owner.ENGINE, f"{self.port} has no callback in which {driven} could act")
-        return lacks_mass(scene)
+        return lacks_mass(scene) or dampers.refusal(scene)
 
     def world(self, scene: Scene, setting: Setting) -> Steps:
         """Return a model of MuJoCo in the port, or in MuJoCo's library."""

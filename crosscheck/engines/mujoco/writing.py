@@ -13,14 +13,27 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.mujoco import dampers
 from crosscheck.engines.mujoco.model import COUPLING, POWERS, description
 from crosscheck.engines.shared.spanning_tree import FREE, Link, Tree, spanning_tree
 from crosscheck.refusals import MOST_COUPLED
 from mbref import rotations
 from mbref.formats import Exported
-from mbref.scene import Force, JointForce, JointLoad, JointTorque, Moment, Scene, SceneError
+from mbref.scene import (
+    Force,
+    JointForce,
+    JointLoad,
+    JointTorque,
+    Load,
+    Moment,
+    PointDamper,
+    RotationalDamper,
+    Scene,
+    SceneError,
+)
 
 CONSTANT = (Moment, Force)  # loads that MJCF cannot describe
+DAMPERS = (RotationalDamper, PointDamper)  # which MJCF describes for some joints
 RESERVED = ("world",)  # names that a body of MJCF cannot have
 LEAST_INERTIA = 1e-15  # kg, kg m²: mjMINVAL, the least mass and moment of a moving body that MuJoCo reads
 KEYFRAME = "loads"  # with the control values of motors that stand for forces and torques of joints
@@ -33,14 +46,20 @@ def write(scene: Scene) -> Exported:
         raise SceneError([f"{scene.name}: MJCF needs the mass and inertia of every body"])
     if links := [body.name for body in scene.body if body.mass == 0]:
         raise SceneError([f"body {links[0]!r}: is a massless link; MuJoCo reads no moving body of mass 0"])
-    kept = [load for load in scene.load if not (isinstance(load, CONSTANT) or load.over_time)]
+    kept = [load for load in scene.load if not (isinstance(load, (*CONSTANT, *DAMPERS)) or load.over_time)]
     pairs = [each for each in scene.coupling if len(each.joints) == MOST_COUPLED and each.powers <= POWERS]
     acting = {load.joint for load in kept if isinstance(load, JointLoad)}
     acting |= {name for coupling in pairs for name in coupling.joints}
     joints = [joint for joint in scene.joint if joint.facts.rows or joint.name in acting]
     bare = scene.with_(joint=joints, driver=(), load=kept, coupling=pairs)
     tree = spanning_tree(bare)
-    spec, pushed = description(bare, tree)
+    damped = {k: dampers.of_free_link(scene, tree, k) for k in range(len(tree.links))}
+    damping = [x for x in scene.load if isinstance(x, DAMPERS) and dampers.turning_joints(bare, tree, x)]
+    spec, pushed = description(bare.with_(load=[*kept, *damping]), tree)
+    for k, found in damped.items():
+        for load in found[:1]:
+            spec.joint(f"free {k}").damping[0] = load.damping
+        damping += found
     spec.modelname = scene.name
     parts = {f"link {k}": name for k, name in enumerate(_names(bare, tree))}
     for (key, name), link in zip(parts.items(), tree.links, strict=True):
@@ -59,7 +78,7 @@ def write(scene: Scene) -> Exported:
         new |= given
         other += [f"{kind} name {wanted[k]!r}: is {given[k]!r}" for k in wanted if given[k] != wanted[k]]
     motors = [(new[name], amount) for name, amount, _ in pushed]
-    return Exported(_text(spec, new, motors), (*other, *_left_out(scene)))
+    return Exported(_text(spec, new, motors), (*other, *_left_out(scene, damping)))
 
 
 def _distinct(names: dict[str, str], taken: Iterable[str]) -> dict[str, str]:
@@ -195,7 +214,8 @@ def _true_inertia(body: Any, link: Link) -> None:
     body.ipos, body.iquat = link.offset, rotations.from_matrix(axes)
 
 
-def _left_out(scene: Scene) -> Iterator[str]:
+def _left_out(scene: Scene, damping: Sequence[Load]) -> Iterator[str]:
+    """Yield sentences on what MJCF does not have; it has the dampers ``damping``."""
     for coupling in scene.coupling:
         if len(coupling.joints) > MOST_COUPLED:
             coupled = len(coupling.joints)
@@ -207,6 +227,8 @@ def _left_out(scene: Scene) -> Iterator[str]:
     for i, load in enumerate(scene.load):
         if isinstance(load, CONSTANT):
             yield f"load[{i}] ({load.type} on {load.body}): apply it by mjData.xfrc_applied"
+        elif isinstance(load, DAMPERS) and load not in damping:
+            yield f"load[{i}] ({load.type}): MJCF has dampers of joints, at the centre of mass of a free body"
         elif isinstance(load, JointTorque | JointForce):
             motor = f"its motor is controlled in keyframe {KEYFRAME!r}"
             reason = "MJCF has no loads over time" if load.over_time else motor

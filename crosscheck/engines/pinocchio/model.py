@@ -28,7 +28,7 @@ from crosscheck.engines.shared.spanning_tree import (
     spanning_tree,
 )
 from crosscheck.engines.shared.spring_force import spring_force
-from mbref.scene import Force, JointLoad, Moment, Scene, Spring
+from mbref.scene import Force, JointLoad, Moment, PointDamper, RotationalDamper, Scene, Spring
 from mbref.scene.loads import Action
 
 # the engine refuses couplings with a reason
@@ -152,6 +152,8 @@ class Loads:
         self.moments: list[tuple[int, np.ndarray]] = []
         self.forces: list[_PointForce] = []
         self.springs: list[tuple[Spring, list[tuple[int, Any]]]] = []
+        self.turners: list[tuple[float, list[int]]] = []
+        self.dampers: list[tuple[float, int, tuple[int, Any]]] = []
         self.joint_springs: list[tuple[int, int, Action]] = []  # indices of q and v
         self.evaluated: list[Any] = []  # loads whose torques depend on the position
         maps = twist_maps(mechanism.tree)
@@ -177,6 +179,14 @@ class Loads:
             self.evaluated.append(load)
             pairs = zip(load.bodies, load.points, strict=True)
             self.springs.append((load, [self._point(scene.body_index(b), p) for b, p in pairs]))
+        elif isinstance(load, RotationalDamper):
+            self.evaluated.append(load)
+            links = (mechanism.tree.link_of(scene.body_index(b)) for b in load.bodies)
+            self.turners.append((load.damping, [mechanism.frame(link)[0] for link in links]))
+        elif isinstance(load, PointDamper):
+            self.evaluated.append(load)
+            ends = [self._point(scene.body_index(b), load.point) for b in load.bodies]
+            self.dampers.append((load.damping, ends[0][0], ends[1]))
         elif isinstance(load, JointLoad):
             i, action = mechanism.tree.coordinate(scene, load.joint, load.coordinate), load.action
             self.constant[i] += action.amount
@@ -212,6 +222,19 @@ class Loads:
             force = self._tension(spring, ends)
             for (joint, point), sign in zip(ends, (1.0, -1.0), strict=True):
                 external[joint] += self._pull(joint, point, sign * force)
+        frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        for damping, joints in self.turners:
+            first, second = (pin.getVelocity(self.model, data, j, frame).angular for j in joints)
+            for joint, sign in zip(joints, (damping, -damping), strict=True):
+                moment = sign * data.oMi[joint].rotation.T @ (second - first)
+                external[joint] += pin.Force(np.zeros(3), moment)
+        for damping, first, (second, point) in self.dampers:
+            place = data.oMi[second].act(point.translation)
+            same = pin.SE3(np.eye(3), data.oMi[first].actInv(place))  # the place on the first joint's frame
+            places = [(first, same), (second, point)]
+            rates = [pin.getFrameVelocity(self.model, data, *end, frame).linear for end in places]
+            for end, sign in zip(places, (damping, -damping), strict=True):
+                external[end[0]] += self._pull(*end, sign * (rates[1] - rates[0]))
         return external
 
     def _pull(self, joint: int, point: Any, force: np.ndarray) -> Any:

@@ -37,6 +37,7 @@ from mbref.scene import (
     Fixed,
     Joint,
     Revolute,
+    RotationalDamper,
     Scene,
     SceneError,
     SlideSpring,
@@ -245,8 +246,8 @@ class _Reader:
             self.parts.append(Part("limits", f"limit of joint {made.name!r}, which acts at the start"))
 
     def _dynamics(self, axis: ET.Element, made: Joint) -> None:
-        """Add a spring and damper of a hinge or a slide; friction and springs of other joints are parts to be
-        left out."""
+        """Add a spring and damper of a hinge or a slide, or the damper of a ball joint; friction and springs
+        of other joints are parts to be left out."""
         found = axis.find("dynamics")
         if found is None:
             return
@@ -266,6 +267,9 @@ class _Reader:
         if made.type == "translational":
             self.loads.append(entry(where, SlideSpring, **given, natural_displacement=rest))
             return
+        if made.type == "spherical" and damping:
+            self.loads.append(entry(where, RotationalDamper, bodies=made.bodies, damping=damping))
+            damping = 0.0
         for kind, size in (("damping", damping), ("springs", stiffness)):
             if size:
                 self.parts.append(Part(kind, f"{kind} of joint {made.name!r}"))

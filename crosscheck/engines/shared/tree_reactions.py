@@ -19,7 +19,7 @@ from crosscheck.judge.loads import at_time
 from crosscheck.judge.time_functions import value
 from mbref import rotations
 from mbref.rotations import cross
-from mbref.scene import Distance, Force, JointLoad, Load, Moment, Scene, Spring
+from mbref.scene import Distance, Force, JointLoad, Load, Moment, PointDamper, RotationalDamper, Scene, Spring
 from mbref.scene.joints import ANGLE
 
 ZERO = np.zeros(3)
@@ -162,7 +162,24 @@ def _applied(scene: Scene, tree: Tree, motion: LinkMotion, load: Load) -> list[t
         (p, u), (q, v) = (_point(tree, motion, k, x) for k, x in zip(links, load.points, strict=True))
         force = spring_force(load, q - p, v - u)
         return [(links[0], wrench(force, p)), (links[1], wrench(-force, q))]
+    if isinstance(load, RotationalDamper | PointDamper):
+        first, second = (tree.link_of(scene.body_index(name)) for name in load.bodies)
+        on_first = load.damping * _resisted(tree, motion, first, second, load)
+        return [(first, on_first), (second, -on_first)]
     raise TypeError(f"no wrench of a load of type {load.type!r}")
+
+
+def _resisted(
+    tree: Tree, motion: LinkMotion, first: int, second: int, load: RotationalDamper | PointDamper
+) -> np.ndarray:
+    """Return the wrench (6,) per damping coefficient of a damper on its first link."""
+    spins = [ZERO if k == GROUND_LINK else motion.angular_velocity[k] for k in (first, second)]
+    if isinstance(load, RotationalDamper):
+        return np.array([*ZERO, *(spins[1] - spins[0])])
+    place, rate = _point(tree, motion, second, load.point)
+    if first != GROUND_LINK:
+        rate = rate - motion.velocity[first] - cross(spins[0], place - motion.position[first])
+    return wrench(rate, place)
 
 
 def _along_joint(

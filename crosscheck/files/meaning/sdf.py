@@ -91,8 +91,10 @@ def _joint(joint: ET.Element, frames: Frames) -> Joint:
     pair = frames.link_of(ends[0]), frames.link_of(ends[1])
     at, kind = frames.pose(joint), TYPES[given]
     anchor, axis = vector(at.position), joint.find("axis")
-    if kind in (FIXED, "spherical", "universal", "gearbox"):
+    if kind in (FIXED, "universal", "gearbox"):
         return Joint(name, kind, pair, anchor)
+    if kind == "spherical":
+        return Joint(name, kind, pair, anchor, damping=_dynamics(axis, name)["damping"])
     along = vector(direction(axis, name, at, frames))
     if kind == "screw":
         return Joint(name, kind, pair, anchor, along, pitch=pitch(joint))

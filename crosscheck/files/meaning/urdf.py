@@ -124,8 +124,9 @@ def _joint(joint: ET.Element, pair: tuple[str, str], places: dict[str, Place]) -
     if given not in TYPES:
         raise SceneError([f"joint {name!r}: type {given!r} is none of {', '.join(TYPES)}"])
     kind, anchor = TYPES[given], vector(at.position)
+    damping = coefficients(_number(joint.find("dynamics"), "damping", 0.0))
     if kind in (FIXED, "free"):
-        return Joint(name, kind, pair, anchor)
+        return Joint(name, kind, pair, anchor, damping=damping if kind == "free" else None)
     axis = _numbers(joint.find("axis"), "xyz", (1.0, 0.0, 0.0))
     if not (size := float(np.linalg.norm(axis))):
         raise SceneError([f"joint {name!r}: axis has no length; give xyz a direction, such as 0 0 1"])
@@ -141,7 +142,7 @@ def _joint(joint: ET.Element, pair: tuple[str, str], places: dict[str, Place]) -
         pair,
         anchor,
         at.direction(axis / size),
-        damping=coefficients(_number(dynamics, "damping", 0.0)),
+        damping=damping,
         stiffness=(),
         armature=0.0,
         friction=_number(dynamics, "friction", 0.0),

@@ -104,14 +104,17 @@ class SlideForm:
 
     turns = False
 
-    def __init__(self, of: Any, joint: Joint):
+    def __init__(self, axis: np.ndarray, apart: np.ndarray, zeros: Any):
+        self.axis, self.apart, self.zeros = axis, apart, zeros
+
+    @classmethod
+    def of_joint(cls, of: Any, joint: Joint) -> SlideForm:
+        """Return the displacement of a joint."""
         first, second = of.indices(joint.bodies)
         anchors = joint.anchor_pair
-        self.axis = of.direction(first, of.frame(joint.directions[0])[2])
-        self.apart, self.zeros = (
-            of.point(second, anchors[1]) - of.point(first, anchors[0]),
-            of.arithmetic.zeros,
-        )
+        axis = of.direction(first, of.frame(joint.directions[0])[2])
+        apart = of.point(second, anchors[1]) - of.point(first, anchors[0])
+        return cls(axis, apart, of.arithmetic.zeros)
 
     def series(self, start: Any, terms: int) -> SlideSeries:
         """Return the displacement as a series with the given number of terms."""
@@ -214,7 +217,7 @@ class JointCoordinates:
         key = joint.name, coordinate
         if key not in self._numbers:
             self._numbers[key] = len(self.forms)
-            self.forms.append((AngleForm if coordinate == ANGLE else SlideForm)(self._of, joint))
+            self.forms.append((AngleForm if coordinate == ANGLE else SlideForm.of_joint)(self._of, joint))
         return self._numbers[key]
 
     def start(self) -> list[Any]:

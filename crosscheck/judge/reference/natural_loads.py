@@ -6,7 +6,8 @@ coordinates are known to order k + 1, which dampers need.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,9 @@ from crosscheck.judge.reference.held_rows import function_series
 from crosscheck.judge.reference.motion import Ended
 from crosscheck.judge.reference.natural import NaturalCoordinates, skew
 from crosscheck.judge.reference.natural_joints import AngleForm, SlideForm, convolved
-from mbref.scene import Factor, Force, JointLoad, Moment, Spring
+from mbref.scene import Factor, Force, JointLoad, Moment, PointDamper, RotationalDamper, Spring
 from mbref.scene.joints import ANGLE
+from mbref.scene.loads import Action
 
 MEETING = 1e-12  # length of a spring / length of the mechanism, up to which its ends meet
 
@@ -58,8 +60,10 @@ class Loads:
                 self.constant = self.constant + force
         elif isinstance(load, Spring):
             self.springs.append(SpringForm(of, load))
+        elif isinstance(load, JointLoad):
+            (self.turned if load.coordinate == ANGLE else self.slid).append(_of_joint(of, load))
         else:
-            (self.turned if load.coordinate == ANGLE else self.slid).append(JointForm(of, load))
+            self.slid += _damped(of, load)
 
     def refuse_abrupt(self, x: np.ndarray) -> None:
         """Raise Ended if the ends of a spring meet at coordinates x (3, n) where its force has no series."""
@@ -173,14 +177,40 @@ class SpringSeries:
 class JointForm:
     """A load along a joint coordinate: the coordinate, stiffness, damping, natural value, applied amount."""
 
-    def __init__(self, of: NaturalCoordinates, load: JointLoad):
-        joint, turns = of.scene.joint_named(load.joint), load.coordinate == ANGLE
-        self.coordinate = (AngleForm if turns else SlideForm)(of, joint)
-        action, number = load.action, of.arithmetic.number
-        unit = 1 if turns else of.length
+    def __init__(
+        self,
+        of: NaturalCoordinates,
+        coordinate: AngleForm | SlideForm,
+        unit: float,
+        action: Action,
+        over_time: Factor | None = None,
+    ):
+        number = of.arithmetic.number
+        self.coordinate, self.over_time = coordinate, over_time
         self.stiffness, self.damping = (number(x) * unit**2 / of.length**2 for x in action[:2])
         self.rest, self.amount = number(action.natural) / unit, number(action.amount) * unit / of.length**2
-        self.over_time = load.over_time
+
+
+def _of_joint(of: NaturalCoordinates, load: JointLoad) -> JointForm:
+    joint = of.scene.joint_named(load.joint)
+    if load.coordinate == ANGLE:
+        return JointForm(of, AngleForm(of, joint), 1.0, load.action, load.over_time)
+    return JointForm(of, SlideForm.of_joint(of, joint), of.length, load.action, load.over_time)
+
+
+def _damped(of: NaturalCoordinates, load: RotationalDamper | PointDamper) -> Iterator[JointForm]:
+    """Yield products q = a · d with the dissipation of a damper: d leads to its point, along three axes a of
+    the first body; or d are axes of the second body, as (ω₂ - ω₁)² = ½ Σ q'² over nine products."""
+    first, second = of.indices(load.bodies)
+    axes = of.arithmetic.array(np.eye(3))
+    if isinstance(load, PointDamper):
+        aparts = [of.point(second, load.point) - of.point(first, load.point)]
+        unit, action = of.length, Action(damping=load.damping)
+    else:
+        aparts = [of.direction(second, axis) for axis in axes]
+        unit, action = 1.0, Action(damping=load.damping / 2)
+    for axis, apart in itertools.product(axes, aparts):
+        yield JointForm(of, SlideForm(of.direction(first, axis), apart, of.arithmetic.zeros), unit, action)
 
 
 class JointSeries:

@@ -16,7 +16,7 @@ from crosscheck.judge.reference.tree_closures import Rows
 from crosscheck.judge.reference.tree_joints import Placed, Tree
 from crosscheck.judge.reference.vectors import apply, cross, dot, matrices, unit
 from crosscheck.judge.time_functions import values
-from mbref.scene import Force, JointLoad, Moment, Spring
+from mbref.scene import Force, JointLoad, Moment, PointDamper, RotationalDamper, Spring
 
 
 class Loads:
@@ -37,7 +37,7 @@ class Loads:
             kind: [l for l in scene.load if massive and isinstance(l, kind)] for kind in LOADS
         }
         self.moments, self.forces, self.springs = of[Moment], of[Force], of[Spring]
-        self.along = of[JointLoad]
+        self.along, self.turners, self.dampers = of[JointLoad], of[RotationalDamper], of[PointDamper]
         self.acting = np.array([measured[load.coordinate, load.joint] for load in self.along], dtype=int)
         numbers_of = numbers.array([load.action for load in self.along]).reshape(-1, 4)
         self.stiffness, self.damping, self.natural, self.amount = numbers_of.T
@@ -128,6 +128,20 @@ class Loads:
             _push(wrench, body, arm, factor * self.tree.arithmetic.array(load.force))
         for load in self.springs:
             self._pull(placed, load, wrench)
+        for load in self.turners:
+            first, second = (scene.body_index(name) for name in load.bodies)
+            apart = placed.spin[:, second] - placed.spin[:, first]
+            moment = self.tree.arithmetic.number(load.damping) * apart
+            wrench[:, first, 3:] = wrench[:, first, 3:] + moment
+            wrench[:, second, 3:] = wrench[:, second, 3:] - moment
+        for load in self.dampers:
+            first, second = (scene.body_index(name) for name in load.bodies)
+            arm, place, rate = self._point(placed, second, load.point)
+            lever = place - placed.position[:, first]
+            rate = rate - placed.velocity[:, first] - cross(placed.spin[:, first], lever)
+            force = self.tree.arithmetic.number(load.damping) * rate
+            _push(wrench, first, lever, force)
+            _push(wrench, second, arm, -1 * force)
 
     def _pull(self, placed: Placed, load: Spring, wrench: np.ndarray) -> None:
         pair = [self.tree.scene.body_index(name) for name in load.bodies]
@@ -162,7 +176,7 @@ class Loads:
         return rotation @ self.inertia @ np.swapaxes(rotation, -1, -2)
 
 
-LOADS = (Moment, Force, Spring, JointLoad)
+LOADS = (Moment, Force, Spring, JointLoad, RotationalDamper, PointDamper)
 
 
 def _over_bodies(columns: np.ndarray) -> np.ndarray:

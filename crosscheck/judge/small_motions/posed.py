@@ -76,6 +76,8 @@ def _geometry(carried: Carried, joint: Joint) -> dict[str, Any]:
 def _load(carried: Carried, load: Any, coordinates: dict[tuple[str, str], float]) -> dict[str, Any]:
     if load.type == "force":
         return {"point": carried.point(load.body, load.point)}
+    if load.type == "point_damper":
+        return {"point": carried.point(load.bodies[1], load.point)}
     if load.type == "spring":
         ends = zip(load.bodies, load.points, strict=True)
         return {"points": tuple(carried.point(*end) for end in ends)}

@@ -18,6 +18,7 @@ from mbref.motions.trajectory import Trajectory
 from mbref.rotations import Vector3
 from mbref.scene import GROUND, Coupling, Driver, Joint, Load, RollingLine, RollingWheel, Scene
 
+UP = np.array([0.0, 0.0, 1.0])  # direction of the symbol of a point damper
 ACTION = "#b3261e"  # colour of loads and drivers
 STUB = 20.0  # px; half the length of an axis drawn at a joint
 ARROW = 52.0  # px; length of an arrow
@@ -211,6 +212,11 @@ def load_mark(stage: Stage, load: Load) -> str:
     if load.type == "spring":
         first, second = (stage.place(*end) for end in attack(load))
         return stage.line(_zigzag(first, second), f'stroke="{ACTION}" stroke-width="1.6"')
+    if load.type == "point_damper":
+        return stage.sign(load.bodies[1], load.point, _short_zigzag(stage, UP))
+    if load.type == "rotational_damper":
+        carrier = next(name for name in load.bodies[::-1] if name != GROUND)
+        return stage.sign(carrier, stage.scene.body[stage.scene.body_index(carrier)].position, _spiral())
     joint = stage.scene.joint_named(load.joint)
     axis = rotations.unit(joint.directions[0])
     sense = axis * np.copysign(1.0, load.action.amount)

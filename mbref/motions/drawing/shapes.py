@@ -53,9 +53,11 @@ def rim(joint: RollingWheel) -> np.ndarray:
 
 
 def attack(load: Load) -> list[tuple[str, tuple[float, float, float]]]:
-    """Return body and point (world, t = 0) for the ends of a spring, or for a force."""
+    """Return body and point (world, t = 0) for the ends of a spring, for a force or for a point damper."""
     if load.type == "spring":
         return list(zip(load.bodies, load.points, strict=True))
+    if load.type == "point_damper":
+        return [(load.bodies[1], load.point)]
     return [(load.body, load.point)] if load.type == "force" else []
 
 

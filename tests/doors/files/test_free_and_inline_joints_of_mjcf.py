@@ -1,11 +1,12 @@
-"""Exported MJCF: springs along free joints and couplings of inline joints act along the joint's axis."""
+"""MJCF: springs along free joints and couplings of inline joints; damping of free and ball joints."""
 
 import mujoco
 import numpy as np
 import pytest
 
 from crosscheck.engines.mujoco.files import FORMAT
-from mbref import Scene
+from crosscheck.engines.mujoco.importing.reading import source
+from mbref import Scene, simulate
 from mbref.formats import ImportOptions
 from tests.helpers.parts import joint
 
@@ -62,3 +63,29 @@ def test_a_slide_behind_a_ball_joint_of_one_body_is_imported_with_its_spring(tmp
     ]
     [spring] = scene.load
     assert (spring.joint, spring.stiffness, spring.natural_displacement) == ("shin", 50.0, 0.1)
+
+
+DAMPED = """<mujoco><option gravity="0 0 0"/><worldbody><body name="base"><joint type="free" damping=".4"/>
+<inertial mass="2" pos="CENTRE" diaginertia=".3 .4 .5"/><body name="arm" pos=".3 0 0"><inertial mass="1"
+pos=".2 0 .1" diaginertia=".3 .4 .5"/><joint type="ball" damping=".07"/></body></body></worldbody><keyframe>
+<key name="k" qpos=".1 .2 .3 .5 .5 -.5 .5 .8 0 .6 0" qvel="1 2 -1 3 -2 1 2 1 -3"/></keyframe></mujoco>"""
+
+
+def test_damped_free_and_ball_joints_accelerate_as_in_mujoco_and_are_written_again(tmp_path):
+    """A free joint damps the rotation and the origin of the body's frame. Written MJCF has both dampers if
+    the origin is the centre of mass."""
+    path, theirs = tmp_path / "a.xml", np.zeros(6)
+    path.write_text(DAMPED.replace("CENTRE", ".1 -.2 .3"))
+    found = source(path, ImportOptions(keyframe="k"))
+    model, data = found.original, mujoco.MjData(found.original)
+    data.qpos[:], data.qvel[:] = found.qpos, found.qvel
+    mujoco.mj_forward(model, data)
+    mujoco.mj_rnePostConstraint(model, data)
+    for name in (mine := simulate(found.imported.scene, times=[0.0])):
+        mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_BODY, model.body(name).id, theirs, 0)
+        own = np.hstack([mine[name].angular_acceleration[0], mine[name].acceleration[0]])
+        assert np.allclose(own, theirs, rtol=0, atol=1e-10)
+    path.write_text(DAMPED.replace("CENTRE", "0 0 0"))
+    scene = FORMAT.read(path, ImportOptions()).scene
+    path.write_text(FORMAT.write(scene).text)
+    assert FORMAT.read(path, ImportOptions()).scene.load == scene.load

@@ -117,16 +117,17 @@ COUPLED = """<mujoco><compiler angle="radian"/><worldbody>
 @pytest.mark.parametrize("kinds", ["couplings,armature,springs,damping", "everything"])
 def test_without_leaves_out_and_names_only_parts_that_a_scene_cannot_have(files, kinds):
     """A scene can have the coupling "line" of joints and the armature of the hinge ja: they stay, although
-    --without names their kinds. It cannot have the quadratic coupling "curve" of tendons, nor armature,
-    stiffness and damping of the ball joint jd: they are left out and listed. If --without names couplings
-    and armature alone, the file is refused for stiffness and damping."""
+    --without names their kinds, as does the damping of the ball joint jd. It cannot have the quadratic
+    coupling "curve" of tendons, nor armature and stiffness of jd: they are left out and listed. If --without
+    names couplings and armature alone, the file is refused for stiffness."""
     said = files.refusal(COUPLED, "a.xml", "--without", "couplings,armature")
-    assert re.findall(r"^(\w+) of joint 'jd'", said, re.M) == ["stiffness", "damping"] and "curve" not in said
+    assert re.findall(r"^(\w+) of joint 'jd'", said, re.M) == ["stiffness"] and "curve" not in said
     scene, out = files.scene(COUPLED, "a.xml", "--without", kinds)
     assert [(c.name, c.ratio) for c in scene.coupling] == [("line", -3.0)]
     assert {joint.name: joint.reflected_inertia for joint in scene.joint}["ja"] == 0.2
     left = re.findall(r"left out: (\w+) .*?'(\w+)'.* \(--without", out)
-    assert sorted(left) == [("armature", "jd"), ("damping", "jd"), ("equality", "curve"), ("stiffness", "jd")]
+    assert sorted(left) == [("armature", "jd"), ("equality", "curve"), ("stiffness", "jd")]
+    assert [(load.type, load.damping) for load in scene.load] == [("rotational_damper", 0.5)]
 
 
 def two_cranks(size: float, tilt: float = 0.0, rod: float = 1.1) -> str:

@@ -91,12 +91,13 @@ def test_friction_of_a_hinge_is_refused_or_left_out_and_its_spring_stays(tmp_pat
     assert [(load.type, load.stiffness) for load in found.scene.load] == [("torsion_spring", 3.0)]
 
 
-def test_damping_and_spring_of_a_ball_joint_are_refused_by_name(tmp_path: Path) -> None:
-    """A scene has springs and dampers of hinges and slides only; the error lists both faults."""
+def test_damping_of_a_ball_joint_is_read_and_its_spring_is_refused_by_name(tmp_path: Path) -> None:
+    """A scene has dampers of ball joints, here 0.5 N m s/rad, but no springs."""
     with pytest.raises(SceneError) as refused:
         read(tmp_path, LINK + joint("ball", DYNAMICS))
-    causes = [fault.partition(":")[0] for fault in refused.value.faults]
-    assert causes == ["damping of joint 'j'", "springs of joint 'j'"]
+    assert [fault.partition(":")[0] for fault in refused.value.faults] == ["springs of joint 'j'"]
+    [load] = read(tmp_path, LINK + joint("ball", DYNAMICS), without=["springs"]).scene.load
+    assert (load.type, load.bodies, load.damping) == ("rotational_damper", ("ground", "b"), 0.5)
 
 
 def test_export_of_sdf_is_refused_with_a_format_that_works(tmp_path: Path) -> None:

@@ -254,6 +254,8 @@ def test_every_load_and_driver_has_a_picture_of_its_own():
         *({"type": "joint_torque", "joint": "A", "torque": sense} for sense in (-1, 1)),
         *({"type": "joint_force", "joint": "D", "force": sense} for sense in (-1, 1)),
         spring("ground", (1, 0, 0), "slider", (0.7, 0, 0), 1.0, 1.0),
+        {"type": "rotational_damper", "bodies": ["crank", "rod"], "damping": 1},
+        {"type": "point_damper", "bodies": ["crank", "rod"], "point": [0.5, 0, 0], "damping": 1},
         *({"type": f"{k}_spring", "joint": j, "stiffness": 1} for k, j in (("torsion", "A"), ("slide", "D"))),
     ]
     pictures = {still(scene.with_(load=(load,))) for load in loads}

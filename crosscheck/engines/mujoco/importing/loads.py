@@ -13,15 +13,28 @@ from crosscheck.engines.mujoco.importing.chains import kind_of
 from crosscheck.engines.mujoco.importing.groups import Groups
 from crosscheck.engines.mujoco.importing.left_out import Part, joint_name
 from crosscheck.engines.shared.entries import entry
-from mbref.scene import Joint, JointForce, JointTorque, Load, SlideSpring, Spring, TorsionSpring
+from mbref.scene import (
+    GROUND,
+    Joint,
+    JointForce,
+    JointTorque,
+    Load,
+    PointDamper,
+    RotationalDamper,
+    SlideSpring,
+    Spring,
+    TorsionSpring,
+)
 from mbref.scene.joints import ANGLE, DISPLACEMENT, Coordinate
 
 COORDINATES: dict[str, Coordinate] = {"hinge": ANGLE, "slide": DISPLACEMENT}
 
 
-def of_joints(mujoco: Any, model: Any, data: Any, joint_of: Mapping[int, Joint]) -> Iterator[Load | Part]:
-    """Return a spring for every hinge and slide with stiffness or damping; all other springs are parts to
-    be left out.
+def of_joints(
+    mujoco: Any, model: Any, data: Any, groups: Groups, joint_of: Mapping[int, Joint]
+) -> Iterator[Load | Part]:
+    """Return a spring for every hinge and slide with stiffness or damping, and dampers for ball and free
+    joints; all other springs are parts to be left out.
 
     ``joint_of`` maps a MuJoCo joint to the scene's joint that consists of this MuJoCo joint alone.
     """
@@ -31,11 +44,14 @@ def of_joints(mujoco: Any, model: Any, data: Any, joint_of: Mapping[int, Joint])
         if not stiffness and not damping:
             continue
         q, joint = int(model.jnt_qposadr[j]), joint_of.get(j)
-        coordinate = COORDINATES.get(kind_of(mujoco, model, j))
+        kind = kind_of(mujoco, model, j)
+        coordinate = COORDINATES.get(kind)
         if joint is None or coordinate not in joint.facts.loaded:
-            yield from _unknown(model, j, bool(stiffness), bool(damping))
+            dampers = list(_dampers(model, data, groups, j, kind, joint, damping))
+            yield from dampers
+            yield from _unknown(model, j, bool(stiffness), bool(damping and not dampers))
             model.jnt_stiffness[j] = 0
-            model.dof_damping[_dofs(model, j)] = 0
+            model.dof_damping[_dofs(model, j)] *= bool(dampers)
             continue
         rest = float(model.qpos_spring[q] - data.qpos[q]) if stiffness else 0.0
         yield _spring(joint.name, coordinate, stiffness, damping, rest)
@@ -82,6 +98,20 @@ def _springs(mujoco: Any, model: Any, j: int) -> tuple[float, float]:
     stiffness = 0.0 if disabled & flags.mjDSBL_SPRING else float(model.jnt_stiffness[j])
     damping = 0.0 if disabled & flags.mjDSBL_DAMPER else float(model.dof_damping[model.jnt_dofadr[j]])
     return stiffness, damping
+
+
+def _dampers(
+    model: Any, data: Any, groups: Groups, j: int, kind: str, joint: Joint | None, damping: float
+) -> Iterator[Load]:
+    """Return the dampers of a ball or free joint. A free joint damps the rotation of its body and the
+    velocity of the origin of the body's frame."""
+    if not damping or not (kind == "free" or (kind == "ball" and joint is not None)):
+        return
+    body = int(model.jnt_bodyid[j])
+    where, pair = f"damping of joint {joint_name(model, j)}", (GROUND, groups.name_of(body))
+    if kind == "free":
+        yield entry(where, PointDamper, bodies=pair, point=data.xpos[body].tolist(), damping=damping)
+    yield entry(where, RotationalDamper, bodies=joint.bodies if joint else pair, damping=damping)
 
 
 def _unknown(model: Any, j: int, stiff: bool, damped: bool) -> Iterator[Part]:

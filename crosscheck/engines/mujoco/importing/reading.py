@@ -304,7 +304,7 @@ class _Reader:
     def _read_loads(self) -> None:
         mujoco, model, data = self.mujoco, self.model, self.poses.data
         found = [
-            *loads.of_joints(mujoco, model, data, self.joint_of),
+            *loads.of_joints(mujoco, model, data, self.groups, self.joint_of),
             *loads.of_actuators(mujoco, model, data, self.actuators, self.joint_of),
             *loads.of_tendons(mujoco, model, data, self.groups),
         ]

@@ -17,6 +17,8 @@ def pushes(scene: Scene, pose: tuple[np.ndarray, np.ndarray], motion: np.ndarray
     found[:-1, :3] = np.outer([body.mass or 0.0 for body in scene.body], np.array(scene.gravity))
     actions = {
         "spring": _spring,
+        "rotational_damper": _rotational_damper,
+        "point_damper": _point_damper,
         **dict.fromkeys(("torsion_spring", "joint_torque"), _turning),
         **dict.fromkeys(("slide_spring", "joint_force"), _sliding),
     }
@@ -35,6 +37,27 @@ def _spring(scene: Scene, load: Any, pose: Any, motion: np.ndarray) -> list[tupl
     along = apart / length if length else np.eye(3)[0]  # MuJoCo's direction of a spring without length
     pull = load.stiffness * (length - load.natural_length) + load.damping * along @ (rates[1] - rates[0])
     return _wrenches(pose, bodies, places, pull * along)
+
+
+def _rotational_damper(
+    scene: Scene, load: Any, pose: Any, motion: np.ndarray
+) -> list[tuple[int, np.ndarray]]:
+    bodies = [scene.body_index(name) for name in load.bodies]
+    first, second = (_spin(motion, b) for b in bodies)
+    moment = np.concatenate([np.zeros(3), load.damping * (second - first)])
+    return [(bodies[0], moment), (bodies[1], -moment)]
+
+
+def _point_damper(scene: Scene, load: Any, pose: Any, motion: np.ndarray) -> list[tuple[int, np.ndarray]]:
+    bodies = [scene.body_index(name) for name in load.bodies]
+    places, rates = _points(scene, pose, motion, bodies, [load.point] * 2)
+    seen = rates[1] - rates[0] - np.cross(_spin(motion, bodies[0]), places[1] - places[0])
+    return _wrenches(pose, bodies, [places[1]] * 2, load.damping * seen)
+
+
+def _spin(motion: np.ndarray, body: int) -> np.ndarray:
+    """Return the angular velocity of a body, zero of the ground."""
+    return motion[body, 3:] if body >= 0 else np.zeros(3)
 
 
 def _points(scene: Scene, pose: Any, motion: np.ndarray, bodies: Sequence[int], points: Any) -> Any:
