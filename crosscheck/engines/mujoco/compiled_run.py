@@ -28,7 +28,6 @@ UNUSED = (
     "CONTACT",
     "LIMIT",
     "FRICTIONLOSS",
-    "ACTUATION",
     "SENSOR",
     "MIDPHASE",
     "CLAMPCTRL",

@@ -12,7 +12,7 @@ import numpy as np
 from crosscheck.judge import time_functions
 from crosscheck.judge.arithmetic import DOUBLE
 from mbref.motions.trajectory import Outcome, Trajectory
-from mbref.scene import Driver, JointLoad, Scene, Spring, TimeFunction
+from mbref.scene import Driver, JointLoad, PointDamper, RotationalDamper, Scene, Spring, TimeFunction
 from mbref.scene.joints import ANGLE
 
 SCOUT = (2000, 16000)  # numbers of steps of the coarse run that measures the scene's fastest rate
@@ -85,8 +85,8 @@ def moving(driver: Driver) -> Callable[[float], tuple[float, float, float]]:
 
 
 def stated_rate(scene: Scene) -> float:
-    """Return the fastest rate (rad/s) in the scene's data: of its duration, drivers, springs and
-    velocities."""
+    """Return the fastest rate (rad/s) in the scene's data: of its duration, drivers, springs,
+    dampers and velocities."""
     rates = [1 / scene.duration]
     for driver in scene.driver:
         rates += [abs(motion(driver, t)[1]) for t in np.linspace(0, scene.duration, 101)]
@@ -98,6 +98,10 @@ def stated_rate(scene: Scene) -> float:
     for load in scene.load:
         if isinstance(load, Spring):
             rates += [math.sqrt(load.stiffness / mass), load.damping / mass]
+        elif isinstance(load, PointDamper):
+            rates.append(load.damping / mass)
+        elif isinstance(load, RotationalDamper) and inertia > 0:
+            rates.append(load.damping / inertia)
         elif isinstance(load, JointLoad) and (of := inertia if load.coordinate == ANGLE else mass) > 0:
             rates += [math.sqrt(load.action.stiffness / of), load.action.damping / of]
         if load.over_time and load.over_time.sine:

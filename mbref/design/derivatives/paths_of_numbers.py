@@ -21,6 +21,7 @@ UNITS = {  # by field
     "gravity": "m/s²",
 }
 UNITS_OF_TURNS = {"stiffness": "N m/rad", "damping": "N m s/rad", "armature": "kg m²"}
+OF_SLIDES = ("spring", "slide_spring", "point_damper", "translational")  # entries with UNITS_OF_SLIDES
 UNITS_OF_SLIDES = {"stiffness": "N/m", "damping": "N s/m", "armature": "kg"}
 
 
@@ -34,7 +35,7 @@ def unit_of_number(scene: Scene, label: str) -> str:
     if field not in UNITS_OF_TURNS:
         return UNITS.get(field, "")
     number_at(scene, label)
-    slides = _at(scene, label.rpartition(".")[0]).type in ("spring", "slide_spring", "translational")
+    slides = _at(scene, label.rpartition(".")[0]).type in OF_SLIDES
     return (UNITS_OF_SLIDES if slides else UNITS_OF_TURNS)[field]
 
 

@@ -19,7 +19,7 @@ from crosscheck.judge.reaction_balance import with_exact_reactions
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory
-from mbref.scene import Driver, Scene, Sine, Spherical
+from mbref.scene import Driver, PointDamper, RotationalDamper, Scene, Sine, Spherical
 from mbref.scenes import SCENES
 from tests.helpers.measured import MARGIN
 from tests.helpers.parts import hinge, rod
@@ -179,11 +179,13 @@ def test_mujocos_compiled_family_gives_the_true_motion(name: str, beta: float, m
 
 @pytest.mark.parametrize(("family", "beta"), [(FAMILY, 30.0), (PROJECTED, 0.0)], ids=[FAMILY, PROJECTED])
 def test_mujocos_compiled_families_move_and_react_by_gauss_s_principle(family: str, beta: float) -> None:
-    """A scene of seven types of joints, with springs, a force and a moment, and a body that flies freely. Off
-    by at most ten times GAUSS; the projected family keeps joints closed to 1e-12 of the length."""
+    """A scene of seven types of joints, with springs, dampers, a force and a moment, and a body that flies.
+    Off by at most ten times GAUSS; the projected family keeps joints closed to 1e-12 of the length."""
     twist = {"velocity": (0.3, -0.2, 1.0), "angular_velocity": (3.0, 1.0, -2.0)}
     flying = body("flying", (2.0, 1.0, 1.5), (0.1, 0.2, 0.3), **twist)
-    scene = every_joint().with_(body=(*every_joint().body, flying), duration=0.2)
+    drag = PointDamper(bodies=("ground", "flying"), point=(2.1, 1.0, 1.5), damping=0.7)
+    loads = *every_joint().load, drag, RotationalDamper(bodies=("hand", "arm"), damping=0.1)
+    scene = every_joint().with_(body=(*every_joint().body, flying), duration=0.2, load=loads)
     run = simulate("mujoco", scene, 6, family, rtol=1e-9, min_step=1e-9, beta=beta, hard=1e-7)
     off = off_gauss(scene, run)
     assert all(value < MARGIN * GAUSS for value in off.values()), off
