@@ -72,8 +72,7 @@ pos=".2 0 .1" diaginertia=".3 .4 .5"/><joint type="ball" damping=".07"/></body><
 
 
 def test_damped_free_and_ball_joints_accelerate_as_in_mujoco_and_are_written_again(tmp_path):
-    """A free joint damps the rotation and the origin of the body's frame. Written MJCF has both dampers if
-    the origin is the centre of mass."""
+    """A free joint damps its body's rotation and origin. MJCF is written if this is the centre of mass."""
     path, theirs = tmp_path / "a.xml", np.zeros(6)
     path.write_text(DAMPED.replace("CENTRE", ".1 -.2 .3"))
     found = source(path, ImportOptions(keyframe="k"))

@@ -46,10 +46,9 @@ def test_a_damped_pendulum_on_a_ball_joint_has_the_eigenvalues_of_its_closed_for
     ball, damper = joint("S", "spherical", "ground", "b"), TURNING | {"bodies": ["b", "ground"]}
     scene = Scene(name="pendulum", gravity=(0.0, 0.0, -9.81), body=[body], joint=[ball], load=[damper])
     swing = np.roots([0.1 + 2.0 * 0.5**2, C, 2.0 * 9.81 * 0.5])
-    found = [each.eigenvalues for each in mbref.equilibria(scene) if each.scene.body[0].position[2] < 0]
-    found += [each.eigenvalues for each in steady_poses(scene, starts=4) if each.position[0, 2] < 0]
-    errors = [error(each, np.array([*swing, *swing, -C / 0.05, 0.0])) for each in found]
-    assert len(errors) == 2 and max(errors) < 1e-11
+    [mine], [theirs] = mbref.equilibria(scene, starts=1), steady_poses(scene, starts=1)
+    for found in (mine, theirs):
+        assert error(found.eigenvalues, np.array([*swing, *swing, -C / 0.05, 0.0])) < 1e-11
 
 
 def test_random_mechanisms_with_dampers_between_moving_bodies_move_alike_by_all_equations():
