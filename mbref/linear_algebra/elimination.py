@@ -53,14 +53,14 @@ def eliminate_column(a, m, n, k, inverse):
 @kernel
 def lu_of_chosen(a, chosen, lu, exchanges, singular):
     """Compute LU factors of chosen rows and columns of a: their orders, and how many of each. Return the
-    smallest pivot relative to the largest one, 0 if a pivot is at most ``singular``."""
+    smallest pivot relative to the larger of 1 and the largest one; 0 if a pivot is at most ``singular``."""
     rows, columns, rank = chosen
     for i in range(rank):
         for j in range(rank):
             lu[i, j] = a[rows[i], columns[j]]
     if not lu_factor(lu, rank, exchanges, singular):
         return 0.0
-    smallest, greatest = abs(lu[0, 0]), abs(lu[0, 0])
+    smallest, greatest = abs(lu[0, 0]), 1.0
     for i in range(rank):
         smallest, greatest = min(smallest, abs(lu[i, i])), max(greatest, abs(lu[i, i]))
     return smallest / greatest

@@ -9,9 +9,10 @@ The partition is kept while the smallest pivot of Φ_u relative to its largest s
 largest value so far; then the partition of largest pivots is computed. It replaces the present one, and the
 integrator restarts, unless the present one has the greater smallest pivot by a factor. So a partition that is
 chosen near a singular position is replaced behind it, and a good one is kept through a singular position,
-where all pivots are small.  With ``kept`` = 0.1 partitions last near turning points of a coordinate, and
-errors are 10 to 1000 times larger than with 0.6. A partition with fewer dependent coordinates ends the run:
-the run is at a singular position.
+where all pivots are small.  A largest pivot below 1 counts as 1: all pivots fall together where bodies spin
+freely, and a row pᵀp - 1 has a pivot of 1 at least, as a component of p is at least 1/2.  With ``kept`` = 0.1
+partitions last near turning points of a coordinate, and errors are 10 to 1000 times larger than with 0.6. A
+partition with fewer dependent coordinates ends the run: the run is at a singular position.
 
 Rows between velocities alone, as of a wheel that does not slip, leave fewer independent rates than
 independent coordinates.  Then the rates have a partition of their own, of all rows: y contains independent
