@@ -25,6 +25,7 @@ from mbref.scene.rolling import RollingWheel
 MOST_JOINTS = 4096  # number of joints whose primitives are kept
 ORIGIN = (0.0, 0.0, 0.0)
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+FAR_FROM_AXIS = 0.65  # cosine of an angle, above √(1/3), which one component at least does not exceed
 ROWS_OF = {POINT: 3} | dict.fromkeys(
     (DOT1, DOT2, DISTANCE, COUPLED_ANGLE, COUPLED_SLIDE, CONTACT, NO_SLIP), 1
 )
@@ -108,10 +109,12 @@ def cross(a: Vector3, b: Vector3) -> Vector3:
 
 
 def frame(axis: Sequence[float]) -> tuple[Vector3, Vector3, Vector3]:
-    """Return a right-handed triad (x, y, z) with z along the axis."""
+    """Return a right-handed triad (x, y, z) with z along the axis.
+
+    It changes smoothly with an axis near X, Y or Z, and jumps where a component passes ``FAR_FROM_AXIS``.
+    """
     z = unit(axis)
-    sizes = [abs(c) for c in z]
-    helper = AXES[sizes.index(min(sizes))]
+    helper = next(each for each, c in zip(AXES, z, strict=True) if abs(c) < FAR_FROM_AXIS)
     x = unit(cross(helper, z))
     return x, cross(z, x), z
 

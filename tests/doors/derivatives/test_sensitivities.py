@@ -76,6 +76,21 @@ def test_derivatives_of_a_pendulums_angle_equal_those_of_jacobis_function(beside
         assert (np.abs(found.values[:, 0, k] - true) <= MOST_ERRORS * found.errors[:, 0, k]).all()
 
 
+@pytest.mark.parametrize("axis", np.eye(3).tolist())
+def test_derivatives_of_a_driven_bodys_path_by_its_axis_equal_those_of_rodrigues_formula(axis):
+    """A change δ across a unit axis u moves the point r, turned by θ about u, by (1 - cos θ)((δ·r) u + (u·r)
+    δ) + sin θ δ × r; a change along u moves nothing. The pose at t = 0 stays."""
+    times, bob = np.array([0.0, 0.4, 1.1]), body("bob", 1.3, [0.05, 0.06, 0.07], (0.3, -0.4, 0.2))
+    joints = [hinge("A", "ground", "bob", (0.0, 0.0, 0.0), axis)]
+    scene = Scene(name="driven", body=[bob], joint=joints, driver=[{"joint": "A", "polynomial": [0.0, 2.0]}])
+    found = mbref.sensitivities(scene, ["bob.position"], [f"joint[A].axis.{k}" for k in "xyz"], times)
+    u, r, turned = np.array(axis), np.array(bob["position"]), 2.0 * times[:, None, None]
+    across = np.eye(3) - np.outer(u, u)
+    true = (1 - np.cos(turned)) * (np.outer(across @ r, u) + (u @ r) * across)
+    true = true + np.sin(turned) * np.cross(across, r)
+    assert_close(found.values, true.swapaxes(1, 2))
+
+
 def test_number_of_a_body_that_is_called_point_is_no_coordinate_of_a_point():
     """Steps of differences fit the inertia, 1e-6 kg m², not the length of the pendulum, 0.5 m."""
     bob = body("point", 1.3, [1e-6] * 3, (0.3, -0.4, 0.0))
