@@ -49,8 +49,8 @@ class FitResult:
     correlations : ndarray, shape (p, p)
         Correlations of the p numbers, in their order; NaN for undetermined ones.
     undetermined : tuple of dict of str to float
-        Combinations of relative changes of numbers, of points in lengths of the mechanism, by path, that
-        change no column.
+        Combinations of relative changes of the numbers found, of points in lengths of the mechanism, by
+        path, that change no column.
     deviations : dict of str to float
         Root mean square residual of each column, in its unit.
     converged : bool
@@ -214,15 +214,16 @@ class _Problem:
         scaled = self._at(z)[1] / self.scales[:, None] * self.sizes
         return np.asarray(scaled.reshape(-1, len(self.free)))
 
-    def _covariance(self, residuals: np.ndarray, inverse: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return the covariance (p, p) of the numbers z over their sizes, by the variance of each column's
-        residuals; ``inverse`` (p, p) is the inverse of JᵀJ in the determined directions.
+    def _covariance(self, residuals: np.ndarray, inverse: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
+        """Return the covariance (p, p) of the numbers over their sizes in ``jacobian`` (k c, p), by the
+        variance of each column's residuals; ``inverse`` (p, p) is the inverse of JᵀJ in the determined
+        directions.
 
         The residuals of a column lose tr(J_c (JᵀJ)⁻¹ J_cᵀ) degrees of freedom to the numbers. Where less than
         FEWEST_FREE are left, the residuals of all columns give the variance.
         """
         count = len(self.measured)
-        by_column = self.jacobian(z).reshape(self.times.size, count, -1)
+        by_column = jacobian.reshape(self.times.size, count, -1)
         squares = np.einsum("kcp,kcq->cpq", by_column, by_column)
         scatter = (residuals.reshape(-1, count) ** 2).sum(axis=0)
         free = self.times.size - np.einsum("pq,cqp->c", inverse, squares)
@@ -234,15 +235,20 @@ class _Problem:
         """Return the fit with numbers z (p,), over their sizes."""
         residuals, off = self.residuals(z), self._at(z)[0]
         influence = np.sqrt(self.times.size) * np.linalg.norm(self.column_sizes / self.scales)
-        directions = SingularDirections.of(self.jacobian(z), NO_INFLUENCE * influence)
+        jacobian = self.jacobian(z)
+        changes = np.sqrt((jacobian**2).mean(axis=0))
+        jacobian = jacobian * (relative := self.numbers.relative(z, changes))
+        directions = SingularDirections.of(jacobian, NO_INFLUENCE * influence)
         values, right, known = directions
         undetermined = directions.undetermined(self.free)
-        covariance = self._covariance(residuals, (right[known].T / values[known] ** 2) @ right[known], z)
+        covariance = self._covariance(
+            residuals, (right[known].T / values[known] ** 2) @ right[known], jacobian
+        )
         lost = [any(name in combination for combination in undetermined) for name in self.free]
         deviation = np.where(lost, np.nan, np.sqrt(np.diag(covariance)))
         with np.errstate(invalid="ignore"):
             correlations = covariance / np.outer(deviation, deviation)
-        errors = np.where(lost, np.inf, deviation * self.sizes)
+        errors = np.where(lost, np.inf, deviation * self.sizes * relative)
         return FitResult(
             scene=self.numbers.scene_at(z),
             numbers=self.numbers.values(z),

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mbref.design.derivatives.numbers_of_scene import size_of_number
+from mbref.design.derivatives.numbers_of_scene import is_of_point, size_of_number
 from mbref.design.derivatives.paths_of_numbers import number_at
 from mbref.design.derivatives.sensitivities import refuse_repeats
 from mbref.design.derivatives.start_numbers import is_of_start
@@ -16,6 +16,7 @@ from mbref.equations.offsets import assembled
 from mbref.input_error import InputError
 from mbref.scene import Scene
 
+NOTICEABLE = 1e-3  # change of the residuals, in units of these, with which a number differs from zero
 NOT_NEGATIVE = ("mass", "stiffness", "damping", "natural_length", "armature")
 MOMENT = re.compile(r"\.inertia(\[\d\]|\.[xyz]|\[(\d)\]\[\2\])$")  # principal, or on the diagonal
 
@@ -37,6 +38,7 @@ class FreeNumbers:
         pairs = zip(self.start.tolist(), labels, strict=True)
         self.sizes = np.array([size_of_number(value, label, base) for value, label in pairs])
         self.length = base.length
+        self._is_of_point = np.array([is_of_point(label) for label in labels])
         base.release()
         self.lowest = np.where([_is_not_negative(label) for label in labels], 0.0, -np.inf)
 
@@ -46,6 +48,13 @@ class FreeNumbers:
         for label, value in zip(self.labels, (z * self.sizes).tolist(), strict=True):
             scene = scene.with_(label, value)
         return scene
+
+    def relative(self, z: np.ndarray, changes: np.ndarray) -> np.ndarray:
+        """Return factors (p,) on the sizes, with which changes of numbers z (p,) are relative to these: their
+        absolute values, and 1 for points and for numbers that are as good as zero. ``changes`` (p,) are those
+        of the residuals, in their units, by changes of z by 1."""
+        has_size = ~self._is_of_point & (np.abs(z) * changes >= NOTICEABLE)
+        return np.where(has_size, np.abs(z), 1.0)
 
     def values(self, z: np.ndarray) -> dict[str, float]:
         """Return the numbers by path for z (p,), over their sizes."""

@@ -204,8 +204,9 @@ class _Search:
         problem, z = self.problem, found.z
         lower, upper = (np.abs(z - bound) <= AT_BOUND for bound in self.box)
         names, inside = np.array(problem.names), ~(lower | upper)
-        jacobian = problem.jacobian(z)[:, inside]
-        labels = problem.numbers.labels
+        labels, jacobian = problem.numbers.labels, problem.jacobian(z)
+        changes = np.linalg.norm(jacobian, axis=0) / (np.sqrt(len(jacobian)) if problem.peak else 1.0)
+        jacobian[:, : len(labels)] *= problem.numbers.relative(z[: len(labels)], changes[: len(labels)])
         return SynthesisResult(
             scene=problem.scene_at(z),
             numbers=problem.numbers.values(z[: len(labels)]),
@@ -214,7 +215,9 @@ class _Search:
                 for name, low, high in zip(labels, lower.tolist(), upper.tolist(), strict=False)
                 if low or high
             },
-            undetermined=SingularDirections.of(jacobian, NO_EFFECT).undetermined(names[inside].tolist()),
+            undetermined=SingularDirections.of(jacobian[:, inside], NO_EFFECT).undetermined(
+                names[inside].tolist()
+            ),
             columns=problem.goal.columns,
             times=problem.times_at(z),
             wanted=problem.goal.wanted,

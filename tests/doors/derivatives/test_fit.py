@@ -68,6 +68,31 @@ def test_fit_of_a_tiny_pendulum_finds_its_pivot_and_gravity():
         assert found.numbers[number] == pytest.approx(value, rel=1e-5)
 
 
+def damped_cart(unit: float, stiffness: float, damping: float, mass: float = 2.0) -> Scene:
+    """Return a cart that a spring pulls from rest over 0.1 m. Masses, and so forces, are in a unit (kg)."""
+    spring = {"stiffness": stiffness * unit, "damping": damping * unit, "natural_displacement": 0.1}
+    load = {"type": "slide_spring", "joint": "S", **spring}
+    cart = body("cart", mass * unit, [0.1 * unit] * 3, (0.0, 0.0, 0.0))
+    return Scene(name="cart", body=[cart], joint=[slide("S", "ground", "cart", (0.0, 0.0, 0.0))], load=[load])
+
+
+@pytest.mark.parametrize(("unit", "damping"), [(1.0, 1e-9), (1e-9, 0.0)])
+def test_number_that_starts_far_below_its_value_is_determined(unit, damping):
+    """The true stiffness is 50 and the damping 1.5 (N/m and N s/m, times the unit). Standard errors are those
+    of a fit that starts at these. Without a known mass, equal relative changes of all have no effect."""
+    times, free = np.linspace(0.05, 1.0, 20), ["load[0].stiffness", "load[0].damping"]
+    columns = mbref.simulate(damped_cart(unit, 50.0, 1.5), times=times).columns("S.displacement")
+    columns["S.displacement"] += np.random.default_rng(1).normal(scale=NOISE, size=times.size)
+    found, near = (
+        mbref.fit(damped_cart(unit, *rough), columns, free) for rough in ((40, damping), (50, 1.5))
+    )
+    for number, error in near.errors.items():
+        assert found.errors[number] == pytest.approx(error, rel=1e-3)
+        assert found.numbers[number] == pytest.approx(near.numbers[number], abs=1e-3 * error)
+    [open_] = mbref.fit(damped_cart(unit, 40.0, 1.2, 1.7), columns, [*free, "body[cart].mass"]).undetermined
+    np.testing.assert_allclose(np.abs([*open_.values()]), 3**-0.5, rtol=1e-3)
+
+
 def test_standard_error_of_a_number_is_by_the_scatter_of_the_columns_that_determine_it():
     """Forces F push two carts: x = F g with g = t²/(2 m). The regression of each column alone has the
     standard error √(Σ r²/(k - 1)/Σ g²); one column is measured 1000 times as accurately as the other."""
