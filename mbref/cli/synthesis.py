@@ -181,7 +181,8 @@ def _sentences(found: SynthesisResult, least: bool) -> list[str]:
     """Return the outcome, in sentences."""
     lines = []
     if not least:
-        far = "not all points are reached; the residuals are the least ones near the starts"
+        far = "not all points are reached"
+        far += "; the residuals are the least ones near the starts" * found.converged
         lines.append("all points are reached" if found.reached else far)
     known = [size for size in found.starts if size is not None]
     if len(found.starts) > 1:

@@ -3,6 +3,7 @@
 A step d minimises the size of the linear residuals r + J d in a box |d| ≤ Δ within the bounds: SciPy's
 ``lsq_linear`` for a sum of squares (Gauss–Newton), ``linprog`` for the largest residual (Madsen 1975). The
 box shrinks where the linear residuals do not predict the true ones, and where the residuals do not exist.
+Where it vanishes because they do not exist, a step in another direction may lower them: no minimum is found.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from scipy.optimize import linprog, lsq_linear
 
 FIRST_BOX = 0.1  # first Δ, sizes of the numbers
+BY_BOX = 0.5  # length of a step / Δ, from which the box limits it
 SMALLEST_BOX = 1e-11  # Δ or step at which the search has converged
 ROUNDING = 1e-14  # change of the residuals' size / size, or size, that is rounding
 ACCEPTED, GOOD = 1e-4, 0.75  # true / predicted decrease from which a step counts, and the box grows
@@ -45,7 +47,7 @@ def least_residuals(
 ) -> SearchEnd:
     """Return the local minimum from z (p,), whose residuals (r,) exist; NaN marks numbers without residuals.
     ``progress`` is called with the share of the steps done."""
-    r, jac, box = residuals(z), jacobian(z), FIRST_BOX
+    r, jac, box, refused = residuals(z), jacobian(z), FIRST_BOX, False
     for k in range(MOST_SEARCH_STEPS):
         lower, upper = np.maximum(bounds[0] - z, -box), np.minimum(bounds[1] - z, box)
         size = residual_size(r, peak)
@@ -57,7 +59,7 @@ def least_residuals(
         length = np.abs(step).max()
         predicted = size - residual_size(r + jac @ step, peak)
         if length <= SMALLEST_BOX or predicted <= ROUNDING * max(size, 1.0):
-            return SearchEnd(z, r, True)
+            return SearchEnd(z, r, not (refused and length > BY_BOX * box))
         trial = residuals(z + step)
         gain = (size - residual_size(trial, peak)) / predicted
         if gain > ACCEPTED:
@@ -67,6 +69,7 @@ def least_residuals(
             box = length / 4
         elif gain > GOOD:
             box = max(box, 2 * length)
+        refused = np.isnan(gain) or (refused and box < FIRST_BOX)
         if progress:
             progress(k / MOST_SEARCH_STEPS)
     return SearchEnd(z, r, False)

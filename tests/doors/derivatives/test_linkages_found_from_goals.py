@@ -218,6 +218,16 @@ def test_start_whose_crank_cannot_turn_is_left_for_a_random_one():
     np.testing.assert_allclose(numbers_of(found.scene), true_numbers(), rtol=0, atol=FOUND)
 
 
+def test_search_that_a_singular_position_stops_has_not_converged():
+    """The path asks for a crank that is too long to turn. A further column is the height z of the crank's
+    centre, which nothing else changes: at any minimum it is as wanted, 0.9 m."""
+    labels, path = [*PATHS[2:4], "body[crank].position.z"], path_of(PINS, POINT)
+    far = {name: path[name] + 3 * (path[name] - path[name][0]) for name in XY}
+    wanted = {**path, **far, "crank.position.z": np.full(TIMES.size, 0.9)}
+    found = mbref.synthesise(four_bar(PINS, POINT), labels, follow=wanted, starts=1)
+    assert found.refused and abs(found.numbers[labels[2]] - 0.9) > FOUND and not found.converged
+
+
 def test_command_writes_the_scene_and_says_that_points_are_not_reached(tmp_path, capsys):
     """The scene has the mean, (1.15, 0.2), with x at its bound 1.1; an empty cell gives no condition."""
     arm().save(tmp_path / "arm.toml")
