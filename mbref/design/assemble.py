@@ -15,7 +15,7 @@ from mbref.equations.model import Model
 from mbref.equations.offsets import assembled
 from mbref.equations.packing import Packs
 from mbref.equations.parts import FRAME
-from mbref.equations.placed import placed
+from mbref.equations.placed import placed_with_springs
 from mbref.rotations import Vector3
 from mbref.scene import GROUND, Scene, SceneError, refuse_rolling
 
@@ -63,8 +63,9 @@ def assemble(scene: Scene, lengths: Mapping[tuple[str, str], float]) -> Assemble
 
     The points of a link move as little as possible to get its lengths. After that the bodies move, by the
     least mass-weighted displacement, until every joint is satisfied. Masses, inertias and velocities are
-    unchanged. Raises SceneError for joints that share no link, or if the loops cannot be closed with these
-    lengths.
+    unchanged, and so are the poses at which springs of joints are relaxed, and polynomials of couplings:
+    their numbers count from the new poses. Raises SceneError for joints that share no link, or if the loops
+    cannot be closed with these lengths.
     """
     scene = assembled(scene)
     refuse_rolling(scene, "assemblies with given lengths")
@@ -83,7 +84,7 @@ def assemble(scene: Scene, lengths: Mapping[tuple[str, str], float]) -> Assemble
                     f"{100 * share:.0f} % of the changes {abs(phi[worst]):.3g} remains open"
                 ]
             )
-    return _differences(scene, placed(model, q), pairs)
+    return _differences(scene, placed_with_springs(model, q), pairs)
 
 
 def _common_link(scene: Scene, first: str, second: str) -> str:

@@ -32,15 +32,19 @@ def length(scene: Scene, first: str, second: str) -> float:
 
 def test_assembled_four_bar_has_the_requested_lengths_and_its_changes_are_listed():
     """All links have 0.5 m before. Listed are lengths before and after, and the distance by which joint C
-    moves; the crank's centre of mass stays in its middle."""
+    moves; the crank's centre of mass stays in its middle. A spring of joint A is relaxed at one
+    orientation of the crank: its natural angle counts from the new pose."""
     wanted = {("A", "B"): 0.3, ("B", "C"): 0.55, ("C", "D"): 0.45, ("A", "D"): 0.52}
-    found = assemble(find_scene("four_bar_gravity"), wanted)
+    spring = {"type": "torsion_spring", "joint": "A", "stiffness": 2.0, "natural_angle": 0.4}
+    found = assemble(find_scene("four_bar_gravity").with_(load=[spring]), wanted)
     assert violation(found.scene) < ROUNDING
     for pair, d in wanted.items():
         assert length(found.scene, *pair) == pytest.approx(d, abs=ROUNDING)
         assert found.lengths[f"{pair[0]}–{pair[1]}"] == pytest.approx((0.5, d), abs=ROUNDING)
     before, after = (scene.joint_named("C").anchor for scene in (find_scene("four_bar_gravity"), found.scene))
     assert found.joints["C"] == pytest.approx(math.dist(before, after))
+    turned = found.bodies["crank"][1]  # rad; the crank gets steeper
+    assert turned > 0.01 and found.scene.load[0].natural_angle == pytest.approx(0.4 - turned)
     middle = np.mean([found.scene.joint_named(j).anchor for j in "AB"], axis=0)
     assert np.allclose(found.scene.body[0].position, middle, rtol=0, atol=ROUNDING)
 
