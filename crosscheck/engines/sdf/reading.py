@@ -170,7 +170,7 @@ class _Reader:
         if link.find("gravity") is not None and not is_true(link.find("gravity")):
             self.parts.append(Part("gravity-compensation", f"link {own!r} without weight"))
         if is_true(link.find("kinematic")):
-            self.parts.append(Part("kinematic-links", f"link {own!r} is kinematic: no force moves it"))
+            self.parts.append(Part("kinematic-links", f"kinematic link {own!r}"))
         if link.find("velocity_decay") is not None:
             self.parts.append(Part("damping", f"velocity_decay of link {own!r}"))
         centre = at.then(place)

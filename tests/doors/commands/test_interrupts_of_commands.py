@@ -33,8 +33,7 @@ def test_interrupt_of_an_import_ends_a_command_with_one_word(program) -> None:
 
 
 def test_interrupt_that_python_loses_while_it_removes_an_object_ends_the_command_too(capsys):
-    """Python prints a traceback for an exception in ``__del__``, and goes on: the command would sleep on, and
-    return 0."""
+    """Python prints a traceback for an exception in ``__del__``, and goes on: the command would sleep on."""
 
     class Removed:
         def __del__(self) -> None:
