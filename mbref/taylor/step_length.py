@@ -11,7 +11,7 @@ from mbref.kernels.compilation import kernel
 from mbref.stepping.loop import share
 from mbref.taylor.coefficients import largest_used
 from mbref.taylor.crossing.acceptance import crossing_tolerance, step_tolerance
-from mbref.taylor.crossing.detection import time_to_singular_position
+from mbref.taylor.crossing.detection import ends_deep, time_to_singular_position
 from mbref.taylor.crossing.thresholds import (
     CROSSING_MARGIN,
     CROSSING_START,
@@ -21,7 +21,6 @@ from mbref.taylor.crossing.thresholds import (
 )
 from mbref.taylor.loads import time_to_no_length
 from mbref.taylor.mode import is_accurate
-from mbref.taylor.partition import least_pivot
 
 SHORTER = 0.7  # length of the next attempt / length of the failed attempt
 
@@ -78,7 +77,7 @@ def next_length(h, regular, memory):
     the series above rounding allow this length. If not, the step ends before the position.
     """
     step = memory.step
-    near = step.crossed or least_pivot(memory) < MIN_PIVOT_RATIO * memory.distance.start_pivot
+    near = step.crossed or ends_deep(memory)
     if step.used_order == step.last_order and near and h > regular:
         across = OVERSHOOT * time_to_singular_position(h, memory)
         step.used_order = order_of_least_term(across, memory)

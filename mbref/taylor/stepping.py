@@ -17,17 +17,12 @@ from mbref.linear_algebra.vectors import larger
 from mbref.stepping.loop import DONE, PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED
 from mbref.taylor.coefficients import largest_used
 from mbref.taylor.crossing.acceptance import crossing_tolerance, judge_branch, step_tolerance
-from mbref.taylor.crossing.detection import save_pivots, time_to_singular_position
+from mbref.taylor.crossing.detection import ends_deep, save_pivots, time_to_singular_position
 from mbref.taylor.crossing.location import count_crossings
 from mbref.taylor.crossing.rounding_pole import remove_pole, time_of_pole
 from mbref.taylor.crossing.start import is_turned
 from mbref.taylor.crossing.steps_across import cross_briefly, is_full, switches_branch
-from mbref.taylor.crossing.thresholds import (
-    MIN_GAIN,
-    MIN_PIVOT_RATIO,
-    ROUNDED_MOTION,
-    VIOLATION_FLOOR,
-)
+from mbref.taylor.crossing.thresholds import MIN_GAIN, ROUNDED_MOTION, VIOLATION_FLOOR
 from mbref.taylor.layout import BEGIN, EXPAND, SAVE_SERIES, SERIES, TAKE_STEP
 from mbref.taylor.loads import expand_functions, part_behind_no_length
 from mbref.taylor.mode import is_accurate
@@ -172,6 +167,7 @@ def take_step(memory):
         status = expand_at(h, last, memory)
         if status == OK:
             status = judge_step(h, last, memory)
+        # a run that ends deep needs a step as long as one that crosses: shorter ones start in rounding
         if status == OK and (state.crossed or h <= regular or (last and ends_deep(memory))):
             break
         if status == SINGULAR_AHEAD or (status == UNDECIDED and (state.crossed or h <= regular)):
@@ -200,16 +196,6 @@ def end_of_step(memory):
 def is_last(h, stop, memory):
     """Return whether a step of h seconds ends the run."""
     return h >= stop - memory.run.loop.clock.time and stop >= memory.progress.end
-
-
-@kernel
-def ends_deep(memory):
-    """Return whether a step ends much nearer to a singular position than it starts.
-
-    Where the run ends there, a step like one that crosses reaches the end. Shorter steps would start so near
-    that rounding decides their series.
-    """
-    return least_pivot(memory) < MIN_PIVOT_RATIO * memory.distance.start_pivot
 
 
 @kernel

@@ -20,6 +20,7 @@ from mbref.kernels.layout import OK
 from mbref.stepping.loop import SINGULAR_AHEAD, STEP_TOO_SMALL, UNDECIDED
 from mbref.taylor.coefficients import turns_back
 from mbref.taylor.crossing.detection import (
+    ends_deep,
     ends_near_singular,
     is_near_singular,
 )
@@ -32,7 +33,6 @@ from mbref.taylor.crossing.thresholds import (
     MIN_PIVOT,
     MIN_PIVOT_ACROSS,
     MIN_PIVOT_FREE,
-    MIN_PIVOT_RATIO,
     MIN_PIVOT_RATIO_ACROSS,
     MIN_PIVOT_RESOLVED,
     TIME_ROUNDING,
@@ -126,8 +126,7 @@ def judge_crossing(pivot, turned, last, memory):
 def judge_approach(h, pivot, turned, last, memory):
     """Return OK, or the status that refuses a high-accuracy step near a singular position."""
     step, distance = memory.step, memory.distance
-    is_deep = pivot < MIN_PIVOT_RATIO * distance.start_pivot and not last
-    if is_deep or not step.violation <= violation_by_rounding(memory):
+    if (ends_deep(memory) and not last) or not step.violation <= violation_by_rounding(memory):
         return STEP_TOO_SMALL
     if step.correction > MAX_SHIFT * pivot:
         return STEP_TOO_SMALL if last else UNDECIDED

@@ -29,6 +29,7 @@ from mbref.taylor.crossing.thresholds import (
     LOG_LEVEL,
     LOG_ZERO,
     MAX_PARTS,
+    MIN_PIVOT_RATIO,
     MONOTONE_PARTS,
     PART_LENGTH,
     PIVOT_AHEAD,
@@ -65,6 +66,13 @@ def ends_near_singular(pivot, memory):
     position."""
     leaves = memory.distance.leaving and pivot > memory.distance.start_pivot
     return pivot < PIVOT_AHEAD * memory.distance.largest_pivot and not leaves
+
+
+@kernel
+def ends_deep(memory):
+    """Return whether a step ends so much nearer to a singular position than it starts that the next one loses
+    accuracy."""
+    return least_pivot(memory) < MIN_PIVOT_RATIO * memory.distance.start_pivot
 
 
 @kernel
