@@ -21,7 +21,7 @@ from mbref import rotations
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Driver, PointDamper, RotationalDamper, Scene, Sine, Spherical
 from mbref.scenes import SCENES
-from tests.helpers.measured import MARGIN
+from tests.helpers.measured import MARGIN, relative_error
 from tests.helpers.parts import hinge, rod
 from tests.helpers.tree_scenes import body, every_joint
 
@@ -154,29 +154,6 @@ def off_gauss(scene: Scene, run: Trajectory) -> dict[str, float]:
     return {**off, "reactions": unique, "resultants": reactions.resultant}
 
 
-def error_of(scene: Scene, run: Trajectory) -> float:
-    """Return the largest error of poses (m, rad) of a complete run, from the judge's truth."""
-    assert run.outcome is Outcome.COMPLETED, run.message
-    return measure(scene, run, truth_for(scene))["error"]
-
-
-@pytest.mark.parametrize(
-    ("name", "beta", "measured"),  # closures' rate (1/s), measured error (of the length, or rad)
-    [
-        ("spatial_slider_crank_gravity", 20.0, 2.2e-10),
-        ("spatial_slider_crank_driven", 50.0, 7.5e-12),
-        ("bennett", 30.0, 1.3e-9),
-        pytest.param("heavy_top", 15.0, 8.2e-10, marks=pytest.mark.slow),
-        pytest.param("andrews_squeezer", 330.0, 8.4e-10, marks=pytest.mark.slow),
-    ],
-)
-def test_mujocos_compiled_family_gives_the_true_motion(name: str, beta: float, measured: float) -> None:
-    """MuJoCo's accelerations, integrated at 1e-10; errors are at most ten times the measured ones."""
-    scene = SCENES[name]()
-    run = simulate("mujoco", scene, 6, FAMILY, rtol=1e-10, min_step=1e-12, beta=beta, hard=1e-9)
-    assert error_of(scene, run) < MARGIN * measured
-
-
 @pytest.mark.parametrize(("family", "beta"), [(FAMILY, 30.0), (PROJECTED, 0.0)], ids=[FAMILY, PROJECTED])
 def test_mujocos_compiled_families_move_and_react_by_gauss_s_principle(family: str, beta: float) -> None:
     """A scene of seven types of joints, with springs, dampers, a force and a moment, and a body that flies.
@@ -198,7 +175,7 @@ def test_mujocos_compiled_family_follows_a_driver_of_a_polynomial_and_a_sine() -
     driver = Driver(joint="A", polynomial=(0.0, 3.0, -20.0), sine=Sine(amplitude=0.4, frequency=30.0))
     scene = SCENES["spatial_slider_crank"]().with_(driver=(driver,), load=(), duration=0.2)
     run = simulate("mujoco", scene, 11, FAMILY, rtol=1e-10, min_step=1e-9, beta=50.0, hard=1e-9)
-    assert error_of(scene, run) < MARGIN * 1.1e-12
+    assert relative_error(run, scene) < MARGIN * 1.1e-12
     assert measure(scene, run, truth_for(scene))["velocity_error"] < MARGIN * 2.1e-12
 
 
@@ -215,25 +192,6 @@ def test_a_failed_run_of_mujocos_compiled_family_has_the_samples_before_its_end(
 
 
 @pytest.mark.parametrize(
-    ("name", "rtol", "shortest", "measured"),  # shortest step (s), measured error (of the length, or rad)
-    [
-        ("planar_slider_crank_equal", 1e-7, 1.7e-4, 2.7e-7),
-        ("planar_slider_crank_heavy", 1e-9, 1.6e-3, 1.3e-9),
-        ("four_bar_gravity", 1e-9, 3.8e-3, 4.3e-9),
-        ("five_bar_gravity", 1e-9, 3.7e-3, 5.2e-10),
-        ("four_bar", 1e-9, 2.4e-4, 3.9e-13),
-        ("h_frame", 1e-10, 1e-9, 1.3e-11),
-    ],
-)
-def test_mujocos_projected_compiled_family_passes_singular_positions(name, rtol, shortest, measured):
-    """Errors are at most ten times the measured ones; projection closes joints to 1e-12 of the length."""
-    scene = SCENES[name]()
-    run = simulate("mujoco", scene, 11, PROJECTED, rtol=rtol, min_step=shortest, beta=0.0, hard=1e-9)
-    assert error_of(scene, run) < MARGIN * measured
-    assert violation_series(scene, run).max() < CLOSED
-
-
-@pytest.mark.parametrize(
     ("name", "tolerance", "measured"),  # tolerance (m, rad), measured error (of the length, or rad)
     [
         ("spatial_slider_crank_driven", 1e-13, 1.8e-14),
@@ -246,7 +204,7 @@ def test_newton_on_mujocos_closures_gives_the_true_driven_motion(name, tolerance
     accelerations have a relative error of 1e-11 measured; 1e-9 is allowed."""
     scene = SCENES[name]()
     run = simulate("mujoco", scene, 11, NEWTON, tolerance=tolerance, turn=0.6)
-    assert error_of(scene, run) < MARGIN * measured
+    assert relative_error(run, scene) < MARGIN * measured
     exact = truth_for(scene).poses(run.times)
     for field in ("velocity", "acceleration"):
         found, wanted = getattr(run, field), getattr(exact, field)
@@ -296,25 +254,6 @@ def pinocchio() -> Engine:
     if reason := why_not():
         pytest.skip(reason)
     return engine("pinocchio")
-
-
-@pytest.mark.parametrize(
-    ("name", "rtol", "shortest", "measured"),  # shortest step (s), measured error (of the length, or rad)
-    [
-        ("planar_slider_crank", 1e-10, 1e-12, 2.4e-9),
-        ("spatial_slider_crank_driven", 1e-10, 1e-12, 1.2e-12),
-        ("heavy_top", 1e-10, 1e-12, 8.2e-10),
-        ("bennett", 1e-10, 5.5e-3, 1.1e-9),
-        ("planar_slider_crank_equal", 1e-9, 1.7e-4, 1.2e-9),
-        ("five_bar_gravity", 1e-10, 3.7e-3, 2e-11),
-    ],
-)
-def test_pinocchios_compiled_family_gives_the_true_motion(pinocchio: Engine, name, rtol, shortest, measured):
-    """Errors are at most ten times the measured ones; joints are closed to 1e-12 of the length."""
-    scene = SCENES[name]()
-    run = simulate("pinocchio", scene, 11, "tuned, compiled", rtol=rtol, min_step=shortest)
-    assert error_of(scene, run) < MARGIN * measured
-    assert violation_series(scene, run).max() < CLOSED
 
 
 @pytest.mark.parametrize("family", ["dop853, compiled", "tuned, compiled"])

@@ -6,13 +6,24 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance.mechanisms.features import BODY, JOINTS
-from crosscheck.engine import BUILT_IN, ON_REQUEST, OPTIONAL, Cannot, Engine, Owner, Setting, Supports, engine
+from crosscheck.engine import (
+    BUILT_IN,
+    ON_REQUEST,
+    OPTIONAL,
+    Cannot,
+    Engine,
+    Owner,
+    Setting,
+    Supports,
+    engine,
+    installed,
+)
 from crosscheck.engines.shared.constraint_equations import Constraints
 from crosscheck.engines.shared.spanning_tree import spanning_tree
 from crosscheck.judge.constraints import initial_poses, jacobian
 from mbref.equations.joints import ROWS_OF, primitives_of
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import HOLONOMIC_JOINTS, Driver, JointFacts, Revolute, Scene
+from mbref.scene import HOLONOMIC_JOINTS, Driver, JointFacts, Revolute, Scene, Sine
 from mbref.scene.joints import JointEntry
 from mbref.scene.loads import LoadEntry
 
@@ -96,6 +107,14 @@ def test_reason_names_an_undeclared_driver_of_a_declared_joint() -> None:
     assert supports.missing(hinged_body()) is None
     driven = supports.missing(hinged_body(driver=(Driver(joint="J"),)))
     assert driven is not None and "'J'" in driven.reason and "angle" in driven.reason, driven
+
+
+@pytest.mark.skipif(not installed("simbody"), reason="simbody is not installed")
+def test_simbody_refuses_a_driver_by_polynomial_and_sine_at_once() -> None:
+    """OpenSim's functions are one or the other; the refusal names the joint and the engine as the owner."""
+    driver = Driver(joint="J", polynomial=(0.0, 1.0), sine=Sine(amplitude=0.1, frequency=3.0))
+    refusal = engine("simbody").cannot(hinged_body(driver=(driver,)))
+    assert refusal is not None and refusal.owner is Owner.ENGINE and "J" in refusal.reason, refusal
 
 
 @pytest.mark.parametrize("kind", HOLONOMIC_JOINTS)

@@ -9,9 +9,9 @@ import pytest
 from crosscheck.engine import Setting, engine
 from crosscheck.engines.mujoco.adapter import ENGINE
 from crosscheck.engines.mujoco.context import LIBRARIES, library
-from crosscheck.engines.mujoco.families import ADAPTIVE, HARD
+from crosscheck.engines.mujoco.families import HARD
 from crosscheck.engines.mujoco.model import compiled
-from crosscheck.judge.metrics import order_of_convergence, violation_series
+from crosscheck.judge.metrics import order_of_convergence
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Body, Scene
 from mbref.scenes import SCENES
@@ -24,24 +24,6 @@ mujoco = pytest.importorskip("mujoco")
 
 def simulate(scene: Scene, duration: float, family: str, **options) -> Trajectory:
     return engine("mujoco").run(scene, np.linspace(0, duration, 11), Setting(family, options))
-
-
-@pytest.mark.parametrize(
-    ("name", "duration", "step", "beta", "measured"),  # s, s, gain (1/s), measured error (m, rad)
-    [
-        ("planar_slider_crank", 0.2, 1.2e-5, 2000.0, 3.7e-9),
-        ("spatial_slider_crank", 0.02, 3e-6, 8000.0, 2.1e-10),
-        ("spatial_slider_crank_driven", 0.2, 2e-5, 1200.0, 1.8e-10),
-        ("four_bar", 0.02, 1e-4, 620.0, 1.5e-11),
-        ("five_bar", 0.02, 1e-4, 620.0, 1.6e-11),
-        ("four_bar_gravity", 0.5, 2e-3, 40.0, 1.5e-10),
-    ],
-)
-def test_tuned_mujoco_stays_within_its_measured_error_of_the_truth(name, duration, step, beta, measured):
-    """RK4 with hard closures ("tuned"). Errors from the truth are at most ten times the measured ones."""
-    scene = SCENES[name]()
-    run = simulate(scene, duration, "tuned", step=step, beta=beta, hard=HARD)
-    assert completed_error(run, scene) < MARGIN * measured
 
 
 @pytest.mark.parametrize(("family", "order"), [("stock", 2), ("euler", 1), ("implicit", 1), ("discrete", 1)])
@@ -113,23 +95,6 @@ def test_thin_disc_whose_rounded_inertia_violates_the_triangle_inequality_moves_
     scene = Scene(name="disc", body=(disc,))
     run = simulate(scene, 0.5, "tuned", step=1e-3, beta=100.0, hard=HARD)
     assert completed_error(run, scene) < MARGIN * 1.7e-13
-
-
-def test_stiff_closures_cross_singular_positions_within_their_measured_error() -> None:
-    """By the judge's truth the swinging four-bar is flat at 0.162, 0.664 and 0.989 s. The error from this
-    truth is at most ten times the measured 4.5e-14 m or rad."""
-    scene = SCENES["four_bar_gravity"]()
-    run = simulate(scene, 1.0, "stiff", step=2e-4, beta=1000.0, hard=HARD)
-    assert completed_error(run, scene) < MARGIN * 4.5e-14
-
-
-def test_projected_mujoco_crosses_singular_positions_within_its_measured_error() -> None:
-    """The four-bar crosses the positions of the test above. At most ten times the measured values are
-    allowed: an error of 3.3e-9 m or rad from the judge's truth, joints violated by 4.4e-14 of the length."""
-    scene = SCENES["four_bar_gravity"]()
-    run = simulate(scene, 1.0, "projected", rtol=1e-8, min_step=4e-3, beta=40.0, hard=ADAPTIVE["projected"])
-    assert completed_error(run, scene) < MARGIN * 3.3e-9
-    assert violation_series(scene, run).max() < MARGIN * 4.4e-14
 
 
 def test_driver_acts_although_mujoco_renumbers_its_rows():

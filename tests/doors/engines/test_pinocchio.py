@@ -18,27 +18,6 @@ def simulate(scene: Scene, duration: float, family: str, **options) -> Trajector
     return engine("pinocchio").run(scene, np.linspace(0, duration, 11), Setting(family, options))
 
 
-TUNED = [  # scene, duration (s), measured error (m, rad)
-    ("planar_slider_crank", 0.08, 9e-13),
-    ("planar_slider_crank_equal", 0.1, 2.8e-10),
-    ("spatial_slider_crank", 0.02, 2.2e-12),
-    ("spatial_slider_crank_driven", 0.1, 5.1e-13),
-    ("four_bar", 0.1, 6.5e-13),
-    ("five_bar", 0.1, 4.8e-13),
-    ("four_bar_gravity", 0.5, 5.1e-12),
-]
-
-
-@pytest.mark.parametrize(("name", "duration", "measured"), TUNED, ids=[name for name, *_ in TUNED])
-def test_tuned_pinocchio_stays_within_its_measured_error_of_the_truth(name, duration, measured):
-    """The error from the judge's truth is at most ten times the largest measured with the settings of
-    tests/machines.py. Singular positions magnify rounding, most for the equal slider-crank."""
-    scene = SCENES[name]().with_(duration=duration)
-    finest = [s for s in engine("pinocchio").settings(scene) if s.family == "tuned"][-1]
-    run = engine("pinocchio").run(scene, np.linspace(0, duration, 11), finest)
-    assert completed_error(run, scene) < MARGIN * measured
-
-
 @pytest.mark.parametrize("name", ["planar_slider_crank", "four_bar", "five_bar"])
 def test_default_solver_of_pinocchio_diverges_with_redundant_closures(name: str) -> None:
     """With redundant rows one iteration does not converge; the message names them as the cause."""
