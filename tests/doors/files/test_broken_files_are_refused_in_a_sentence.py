@@ -1,5 +1,7 @@
 """Broken, binary, deep and impossible files are refused with a sentence and exit status 2."""
 
+import re
+
 import pytest
 
 BODY = """<mujoco><worldbody><body name="a">
@@ -49,6 +51,21 @@ def test_part_with_a_number_that_is_huge_or_not_finite_is_named(files, text, nam
     """The error begins with the body, link or joint, or with the refusal by MuJoCo's own reader."""
     expected = "MuJoCo cannot read it: " if (old, number) in BY_MUJOCO else f"{part}: "
     assert expected in files.refusal(text.replace(old, new.format(number)), name)
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "old", "new", "says"),
+    [
+        (ROBOT, "a.urdf", 'izz="2"', 'izz="5"', "link 'a'.*2, 2, 5 kg m²"),
+        (MODEL, "a.sdf", "<izz>2", "<izz>5", "link 'a'.*2, 2, 5.*<ixx>, <iyy>, <izz>"),
+        (MODEL, "a.sdf", "<damping>3", "<damping>-1", "joint 'j': dynamics.*damping.*-1"),
+    ],
+)
+def test_moments_and_dampers_that_no_body_has_are_refused_with_their_part(files, text, name, old, new, says):
+    """5 > 2 + 2 kg m²; a damper with a negative coefficient would drive the joint. The sentence does not name
+    "balanceinertia", an option of MuJoCo alone."""
+    said = files.refusal(text.replace(old, new), name)
+    assert re.search(says, said) and "balanceinertia" not in said, said
 
 
 OTHERS = [(name, f"{name}: is no XML: ") for name in ("a.urdf", "a.sdf")]

@@ -1,11 +1,16 @@
-"""SDF files mean what their format says: frames of equal names, threads, mimic joints, limits, inertias."""
+"""SDF files mean what their format says: frames of equal names, threads, mimic joints, limits, defaults."""
 
 import math
+import re
 
 import numpy as np
 import pytest
 
 import mbref
+from crosscheck.engines.loaders.loader import SDF
+from crosscheck.engines.sdf.reading import FORMAT
+from crosscheck.files.meaning import meant
+from mbref.scene import SceneError
 
 MOMENTS = "<inertia><ixx>0.02</ixx><iyy>0.03</iyy><izz>0.04</izz></inertia>"
 INERTIA = f"<inertial><mass>2</mass>{MOMENTS}</inertial>"
@@ -135,25 +140,6 @@ def test_a_model_may_stand_in_a_frame_of_the_world_with_the_name_of_its_link(fil
     assert [body.position for body in scene.body] == [(1.0, 2.0, 4.0)]
 
 
-def inertia(xx: float, yy: float, zz: float) -> str:
-    entries = "".join(f"<i{k}{k}>{v}</i{k}{k}>" for k, v in zip("xyz", (xx, yy, zz), strict=True))
-    return f"<inertial><mass>1</mass><inertia>{entries}</inertia></inertial>"
-
-
-def test_a_moment_of_inertia_larger_than_the_two_others_together_is_refused(files):
-    """No body has such moments: 0.9 > 0.2 + 0.3 kg m²."""
-    text = sdf(link("plate", inertia=inertia(0.2, 0.9, 0.3)), joint("j", "revolute", "world", "plate"))
-    said = files.refusal(text, "plate.sdf")
-    assert "link 'plate'" in said and "0.2, 0.3, 0.9" in said and "<ixx>, <iyy>, <izz>" in said
-
-
-def test_a_number_that_no_scene_has_is_refused_with_its_part(files):
-    """A damper with a negative coefficient would drive the joint."""
-    damped = joint("j", "revolute", "world", "plate", inside="<dynamics><damping>-1</damping></dynamics>")
-    said = files.refusal(sdf(link("plate"), damped), "plate.sdf")
-    assert "joint 'j': dynamics" in said and "damping" in said and "-1" in said
-
-
 def hanging(limit: str, kind: str = "revolute") -> str:
     """A body that gravity turns about y towards larger angles, or that falls along -z."""
     axis, at = ("0 1 0", "0.3 0 0 0 0 0") if kind == "revolute" else ("0 0 1", "0 0 0 0 0 0")
@@ -214,3 +200,78 @@ def test_a_chain_of_2000_frames_is_followed_to_its_end(files):
     scene, _ = files.scene(text, "far.sdf")
     rounding = 2000 * 2.2e-16 * 2.0  # m: 2000 sums of up to 2 m
     assert np.allclose(scene.body[0].position, [2.0, 0.0, 0.0], rtol=0, atol=rounding)
+
+
+def test_links_without_inertial_and_worlds_without_gravity_get_sdf_s_defaults(files):
+    """The format's defaults: 1 kg and 1 kg m² about each axis; 9.8 m/s² downwards. Notes state gravity, and a
+    link without the element ``inertial``."""
+    links = link("b", inertia=""), link("c", inertia="<inertial/>")
+    bare = sdf(*links, link("d", inertia="<inertial><inertia/></inertial>"))
+    scene, said = files.scene(bare, "bare.sdf")
+    assert [(body.mass, body.inertia) for body in scene.body] == [(1.0, (1.0, 1.0, 1.0))] * 3
+    assert re.findall("link '.' has no inertial", said) == ["link 'b' has no inertial"]
+    assert "link 'b' has no inertial: 1 kg and 1 kg m², the defaults of SDF" in said
+    assert "gravity is 9.8 m/s² downwards, the default of SDF" in said and scene.gravity == (0.0, 0.0, -9.8)
+
+
+@pytest.mark.parametrize(("version", "gravity"), [("1.4", -1.6), ("1.5", -1.6), ("1.6", -9.8)])
+def test_gravity_of_the_physics_counts_before_sdf_1_6_in_the_import_and_in_every_reader(
+    files, version, gravity
+):
+    """Version 1.6 moved the element to the world, whose default is 9.8 m/s² downwards."""
+    text = f"<physics><gravity>0 0 -1.6</gravity></physics><model name='m'>{link('b')}</model>"
+    scene, said = files.scene(f"<sdf version='{version}'><world name='w'>{text}</world></sdf>", "moon.sdf")
+    assert scene.gravity == meant(files.folder / "moon.sdf", SDF).gravity == (0.0, 0.0, gravity)
+    assert ("of a physics: is not read" in said) == (gravity == -9.8)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "kind", "sentence"),
+    [
+        ("</inertial>", "<fluid_added_mass/></inertial>", "fluid", "the added mass of link 'b' in a fluid"),
+        ("</link>", "<gravity>false</gravity></link>", "gravity-compensation", "link 'b' without weight"),
+        ("</link>", "<gravity>0</gravity></link>", "gravity-compensation", "link 'b' without weight"),
+        ("</link>", "<velocity_decay/></link>", "damping", "velocity_decay of link 'b'"),
+        ("</link>", "<kinematic>1</kinematic></link>", "kinematic-links", "kinematic link 'b'"),
+    ],
+)
+def test_link_element_that_changes_the_motion_is_refused_or_left_out(files, old, new, kind, sentence):
+    """The error and the list of what is left out name the element, the link and the option ``--without``."""
+    text = sdf(link("b").replace(old, new))
+    says = f"{sentence}: it changes the motion; --without {kind} leaves it out"
+    assert says in files.refusal(text, "b.sdf")
+    assert f"left out: {sentence} (--without {kind})" in files.scene(text, "b.sdf", "--without", kind)[1]
+
+
+SPRUNG = (
+    "<dynamics><damping>0.5</damping><friction>0</friction><spring_reference>0.25</spring_reference>"
+    "<spring_stiffness>3</spring_stiffness></dynamics>"
+)
+
+
+def test_friction_of_a_hinge_is_refused_or_left_out_and_its_spring_stays(files):
+    """The hinge has dry friction 7 N m and a spring of 3 N m/rad."""
+    rough = SPRUNG.replace("<friction>0", "<friction>7")
+    text = sdf(link("b"), joint("j", "revolute", "world", "b", inside=rough))
+    assert "dry friction of joint 'j': it changes the motion" in files.refusal(text, "b.sdf")
+    scene, said = files.scene(text, "b.sdf", "--without", "friction")
+    assert (
+        said.count("left out: ")
+        == said.count("left out: dry friction of joint 'j' (--without friction)")
+        == 1
+    )
+    assert [(load.type, load.stiffness) for load in scene.load] == [("torsion_spring", 3.0)]
+
+
+def test_damping_of_a_ball_joint_is_read_and_its_spring_is_refused_by_name(files):
+    """A scene has dampers of ball joints, here 0.5 N m s/rad, but no springs."""
+    text = sdf(link("b"), joint("j", "ball", "world", "b", inside=SPRUNG))
+    assert re.findall("^[^:]* of joint 'j'", files.refusal(text, "b.sdf"), re.M) == ["springs of joint 'j'"]
+    [load] = files.scene(text, "b.sdf", "--without", "springs")[0].load
+    assert (load.type, load.bodies, load.damping) == ("rotational_damper", ("ground", "b"), 0.5)
+
+
+def test_export_of_sdf_is_refused_with_a_format_that_works(files):
+    """Scenes are read from SDF but not written; MJCF (.xml) is named instead."""
+    with pytest.raises(SceneError, match=r"SDF: is read only; export as \.xml"):
+        FORMAT.write(files.scene(sdf(link("b")), "b.sdf")[0])

@@ -105,13 +105,6 @@ def test_an_expression_of_xacro_is_refused_with_its_element_and_value(files, val
     assert f"<mass value='{value}'>: is an expression of xacro" in said
 
 
-def test_a_moment_of_inertia_larger_than_the_two_others_together_is_refused(files):
-    """0.5 > 0.1 + 0.2 kg m². The sentence does not name "balanceinertia", an option of MuJoCo alone."""
-    text = robot(*CRANKS).replace(MOMENTS, 'ixx="0.1" ixy="0" ixz="0" iyy="0.5" iyz="0" izz="0.2"', 1)
-    said = files.refusal(text, "r.urdf")
-    assert "link 'a'" in said and "0.1, 0.2, 0.5 kg m²" in said and "balanceinertia" not in said
-
-
 @pytest.mark.parametrize("excess", [0.0, 1e-16, 1e-13, 1e-10])
 def test_inertia_of_a_flat_link_is_read_though_rounding_makes_it_impossible(files, excess):
     """A flat link has 0.3 = 0.1 + 0.2 kg m². A file may have a largest moment that is greater by a relative
