@@ -23,9 +23,7 @@ from crosscheck.small_motions.mechanisms import (
     spring_four_bar,
     turning_pendulum,
 )
-from mbref.scene import Scene, SceneError
-from tests.helpers.parts import joint
-from tests.helpers.statics import rod
+from mbref.scene import SceneError
 
 KNOWN = {mechanism.name: mechanism for mechanism in MECHANISMS}
 
@@ -57,19 +55,6 @@ def test_judge_finds_the_eigenvalues_of_closed_forms(judged):
         assert found[best].stability == ("unstable" if unstable else "stable")
 
 
-def test_judge_finds_the_frequency_on_a_spring_far_shorter_than_the_mechanism():
-    """A slide of 2 kg, 1 m off its guide's anchor, is on a spring of 300 N/m and 1 mm across the guide, twice
-    its natural length: half of 300 N/m acts along the guide. mbref's accelerations have it to 1e-6."""
-    guide = joint("A", "translational", "ground", "rod", (-0.3, 0.0, 0.0), axis=(1.0, 0.0, 0.0))
-    ends = {"bodies": ["ground", "rod"], "points": [[0.7, 1e-3, 0.0], [0.7, 0.0, 0.0]]}
-    spring = {"type": "spring", **ends, "stiffness": 300.0, "natural_length": 5e-4}
-    scene = Scene(name="short", body=[rod("rod", (0.7, 0.0, 0.0))], joint=[guide], load=[spring])
-    [each] = steady_poses(scene, starts=1)
-    exact = np.sqrt(150.0 / 2.0) * 1j
-    assert error(each.eigenvalues, np.array([exact, -exact])) < 1e-9
-    assert error(by_accelerations(engine("mbref"), each).eigenvalues, each.eigenvalues) < 1e-6
-
-
 def test_steady_poses_are_balanced_with_symmetric_positive_mass_matrix(judged):
     """Unbalanced forces are below 1e-13 N or N m; eigenvalues are conjugate pairs, to 1e-14."""
     _, found = judged
@@ -85,20 +70,6 @@ def test_four_bar_with_diagonal_spring_rests_at_the_published_angle():
     cranks = [each.position[0] for each in steady_poses(spring_four_bar(), starts=8)]
     angles = np.array([np.arctan2(crank[2], crank[0]) for crank in cranks])
     assert np.abs(angles - 2.23433101898).min() < 5e-11
-
-
-def test_ball_on_a_turning_spindle_has_the_roots_of_euler_s_equations():
-    """A body on a ball joint with moments A, B, C turns with a spindle at Ω about its axis of C: seen from
-    the spindle, s = ± i Ω and s² = -Ω² (C - A) (C - B) / (A B), to rounding."""
-    rate, (a, b, c) = 6.0, (0.02, 0.03, 0.045)
-    turned = {"name": "body", "mass": 1.0, "inertia": [a, b, c], "position": [0.0] * 3}
-    joints = [turning_pendulum().joint[0], joint("B", "spherical", "spindle", "body")]
-    bodies = [rod("spindle", (0.0, 0.0, 1.0), 1.0, 0.1), turned]
-    scene = turning_pendulum().with_(body=bodies, joint=joints, gravity=(0.0, 0.0, 0.0))
-    found = steady_poses(scene, starts=1)[0].eigenvalues
-    slow = rate * np.sqrt((c - a) * (c - b) / (a * b))
-    exact = np.array([1j * rate, -1j * rate, 1j * slow, -1j * slow])
-    assert np.abs(found[:, None] - exact).min(axis=0).max() < 1e-12 * rate
 
 
 def test_steady_pose_of_the_governor_stays_steady_when_integrated():
@@ -143,21 +114,6 @@ def test_exudyn_s_own_linearisation_leaves_out_how_constraint_forces_turn():
     exudyn = engine("exudyn")
     assert np.abs(exudyn.own_eigenvalues(at_pose(below.balance, below.state))).max() < 1e-6
     assert error(exudyn.own_eigenvalues(damped_slides()), slides.eigenvalues) < 1e-6
-
-
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        ({"driver": [{"joint": "A", "polynomial": [0.0, 0.0, 1.0]}]}, "small motions need drivers"),
-        ({"driver": [{"joint": "A", "polynomial": [0.0, 1.0]}]}, "not along gravity"),
-        ({"driver": [{"joint": "A"}]}, "no degree of freedom"),
-        ({"body": [{"name": "rod", "position": [0.7, 0.0, 0.0]}]}, r"body\[rod\].mass: is missing"),
-    ],
-)
-def test_scenes_without_small_motions_are_refused(change, says):
-    """The driver of a horizontal pendulum accelerates, turns or holds it, or the pendulum has no mass."""
-    with pytest.raises(SceneError, match=says):
-        steady_poses(pendulum().with_(**change), starts=1)
 
 
 def test_scene_at_an_equilibrium_starts_without_acceleration():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from crosscheck.judge.small_motions.equilibria import steady_poses
 from mbref import Scene, SceneError, equilibria
 from mbref.cli.commands import main
 from tests.helpers import parts
@@ -33,10 +34,14 @@ def with_slide(stiffness: float, damping: float, mass: float) -> Scene:
 
 
 def test_flat_parallelogram_is_an_equilibrium_at_a_singular_position_and_has_no_modes(tmp_path, capsys):
-    """Gravity acts along all links, so they rest: `equilibrium` reports it, and `modes` refuses it."""
+    """Gravity acts along all links, so they rest: `equilibrium` reports it, `modes` refuses it, and the judge
+    leaves it out. The judge finds a parallelogram that hangs, from a start 13° off."""
     flat = parallelogram(sine=0.0, cosine=1.0).with_(gravity=(G, 0.0, 0.0))
     found = equilibria(flat, starts=2)
     assert found[0].stability == "singular" and len(found[0].eigenvalues) == 0
+    assert not steady_poses(flat, starts=1)
+    hanging = steady_poses(parallelogram(sine=-0.96, cosine=0.28), starts=1)
+    assert [each.stability for each in hanging] == ["stable"]
     path = str(tmp_path / "flat.toml")
     flat.save(path)
     assert main(["equilibrium", path, "--starts", "1"]) == 0
@@ -72,13 +77,18 @@ def test_inverted_pendulum_is_stable_or_unstable_by_a_millionth_of_its_critical_
 
 
 def test_slow_fall_of_a_pendulum_is_found_beside_a_damper_ten_million_times_faster():
-    """The pendulum falls with √(m g l / I) = 3.3 1/s, and the block of 0.1 g has c / m = 1e7 1/s."""
+    """The pendulum falls with √(m g l / I) = 3.3 1/s, and the block of 0.1 g has c / m = 1e7 1/s. The judge's
+    error is at most its bound, below 1e-9 1/s, and the rounding of the closed form, 4e-16 of it."""
     fast = with_slide(100.0, 1000.0, 1e-4)
     rate = np.sqrt(TORQUE / ABOUT_HINGE)
     [upright] = equilibria(fast, starts=1)
     assert upright.stability == "unstable"
     assert np.abs(upright.eigenvalues - rate).min() < 1e-8 * rate  # 15 roundings of 1e7 1/s
     assert np.abs(upright.eigenvalues.real).max() == pytest.approx(1e7, rel=1e-6)
+    judged = {each.stability: each for each in steady_poses(fast, starts=4)}
+    errors = np.abs(judged["unstable"].eigenvalues - rate)
+    bound = judged["unstable"].bounds[errors.argmin()]
+    assert set(judged) == {"stable", "unstable"} and errors.min() <= bound + 4e-16 * rate and bound < 1e-9
 
 
 @pytest.mark.parametrize("stiffness", [1e2, 1e5, 1e9])
@@ -169,6 +179,7 @@ def test_tackle_in_balance_is_one_indifferent_equilibrium_with_eigenvalues_zero(
     scene = Scene(name="tackle", gravity=DOWN, body=bodies, joint=joints, coupling=[rope])
     [each] = equilibria(scene, starts=6)
     assert each.stability == "indifferent" and not each.eigenvalues.any() and not len(each.frequencies)
+    assert [each.stability for each in steady_poses(scene, starts=3)] == ["indifferent"]
 
 
 @pytest.mark.parametrize(
