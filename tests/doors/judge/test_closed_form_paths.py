@@ -8,7 +8,6 @@ import pytest
 
 from crosscheck.judge.constraints import closure
 from crosscheck.judge.truth import closed_form
-from crosscheck.judge.truth.locked import locked
 from crosscheck.judge.truth.one_dof import one_dof
 from crosscheck.judge.truth.parallelogram import parallelogram
 from crosscheck.judge.truth.spatial_slider_crank import spatial_slider_crank
@@ -73,15 +72,6 @@ def test_a_parallelogram_without_masses_has_a_closed_form_only_if_it_is_driven()
     plain = tuple(Body(name=b.name, position=b.position) for b in BOX.body)
     assert closed_form(BOX.with_(body=plain)) is None
     assert closed_form(BOX.with_(body=plain, driver=(driver,))).name == "parallelogram"
-
-
-def test_a_body_on_one_hinge_or_on_two_coaxial_hinges_is_not_locked():
-    """`locked` is the closed form of a body that cannot move, or None. Coaxial hinges have five redundant
-    rows of ten, which leave one freedom; hinges about z and x leave none."""
-    crossed = pin("B", "ground", "bar", 0.0, 0.0, 0.0, axis=X)
-    assert locked(PENDULUM.with_(joint=(*PENDULUM.joint, crossed))).name == "locked"
-    assert locked(PENDULUM) is None
-    assert locked(PENDULUM.with_(joint=(*PENDULUM.joint, pin("B", "ground", "bar", 0.0, 0.0, 0.0)))) is None
 
 
 def spatial(line: tuple[float, ...], order: str = "crs", reverse: bool = False, way: float = 1.0) -> Scene:

@@ -288,14 +288,6 @@ def test_reference_is_within_its_bound_of_the_certified_table(name):
     assert (off <= found.bound).all()
 
 
-def test_reference_from_a_singular_position_is_refused_with_the_remedy():
-    """The straight four-bar has two motions from its start; the reason asks for a later time; no sample."""
-    times = np.linspace(0.0, 1e-4, 3)  # s, within the first step
-    motion = natural_motion(SCENES["four_bar_straight"](), times, EXTENDED, seconds=SECONDS)
-    assert "starts in a singular position" in motion.reason and "later time" in motion.reason
-    assert not len(motion.times)
-
-
 def test_reference_names_a_body_that_turns_without_inertia():
     """The free pole has no moment of inertia about its axis x."""
     pole = Body(name="pole", mass=1.0, inertia=(0.0, 0.1, 0.1), position=(0.0, 0.0, 0.0))
