@@ -1,5 +1,6 @@
 """Names of scenes, bodies and joints in file names, commands, pages and pictures."""
 
+import dataclasses
 import json
 import re
 import shlex
@@ -13,6 +14,7 @@ import mbref
 from crosscheck.cli import main as crosscheck
 from crosscheck.study.command import command
 from mbref.cli import main
+from mbref.cli.run import show
 from mbref.files import file_name
 from mbref.scene import Scene, SceneError
 from mbref.scenes import find_scene
@@ -35,6 +37,10 @@ NAMES = [
     *("<img src=x onerror=alert(1)>", "[link](http://example.org)", "$x_1$ {y}", "--out=x", "..", "ü" * 100),
     "a|b & c;d",
 ]
+MARKUP = (
+    *("[red]x[/]", "[/nothing]", "$x_1$", "../../up", "a/b"),
+    *("<b>&amp;</b>", "a|b", "Türe α", "%s {0}", "ground "),
+)
 
 
 def named(name: str) -> Scene:
@@ -171,3 +177,30 @@ def test_scene_files_and_json_give_a_name_back(name, tmp_path, capsys):
     named(name).save(tmp_path / "scene.toml")
     assert main(["diagnose", str(tmp_path / "scene.toml"), "--start", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["scene"] == name
+
+
+@pytest.mark.parametrize("name", MARKUP)
+def test_run_s_table_shows_a_name_literally(name, capsys):
+    """The scene, its body, the method and the message of the run have this name: it is shown four times.
+    MARKUP are names that look like markup of terminals, HTML and formulas, or like paths."""
+    run = dataclasses.replace(mbref.simulate(named(name), times=[0.0]), method=name, message=name)
+    show(run.mechanism, run)
+    out = capsys.readouterr().out
+    assert out.count(name.strip()) >= 4, out
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("x" * 5000, "x: File name too long"),
+        ("a\nb", r"unknown scene 'a\nb'"),
+        (".", ".: cannot be read: Is a directory"),
+        ("/", "/: cannot be read: Is a directory"),
+        ("", "unknown scene ''"),
+    ],
+)
+def test_name_of_no_scene_and_no_file_is_refused_in_one_line(name, says, capsys):
+    """Messages have less than 700 characters, also for a name of 5000; the status is 2."""
+    assert main(["diagnose", name]) == 2
+    said = capsys.readouterr().err
+    assert says in said and said.count("\n") == 1 and len(said) < 700

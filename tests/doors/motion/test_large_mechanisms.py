@@ -1,12 +1,9 @@
 """Many bodies: their largest distance, long chains in another order and frame, a long row of gears."""
 
-import functools
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
-from mbref import Motion, Outcome, Scene, simulate
+from mbref import Outcome, Scene, simulate
 from mbref.equations.largest_distance import largest_distances
 from mbref.rotations import to_matrix
 from mbref.scenes.four_bar_chain import four_bar_chain
@@ -27,11 +24,6 @@ SHAPES = {
 TURN_OF_FRAME, SHIFT = np.array([0.5, 0.1, -0.7, 0.5]), np.array([3.0, -2.0, 5.0])
 
 
-def frame(scene: Scene) -> Scene:
-    """Return the scene turned by TURN_OF_FRAME and moved by SHIFT."""
-    return in_another_frame(scene, TURN_OF_FRAME, SHIFT)
-
-
 @pytest.mark.parametrize("shape", SHAPES)
 def test_largest_distance_is_the_largest_of_all_pairs(shape):
     """Here all pairs of points are compared; the function compares boxes of neighbouring points first. The
@@ -42,30 +34,20 @@ def test_largest_distance_is_the_largest_of_all_pairs(shape):
     assert largest_distances(np.stack([points, shuffled])) == pytest.approx([exact, exact], rel=4e-16, abs=0)
 
 
-@functools.cache
-def chain_after(change: Callable[[Scene], Scene] | None = None) -> Motion:
-    """Return the completed motion of a chain of 20 four-bars, 41 bodies, that a function changes."""
-    scene = four_bar_chain(20)
-    run = simulate(change(scene) if change else scene, times=[0.02])
-    assert run.outcome == Outcome.COMPLETED, run.message
-    return run
-
-
 STEPS = 41 * 1e-9  # m: the tolerance of the run for each of 41 bodies
 
 
-def test_long_chain_moves_alike_in_another_order_of_its_parts():
-    """Bodies, joints and loads of 20 four-bars are listed in another order."""
-    motion, other = chain_after(), chain_after(in_another_order)
-    places = [other.bodies.index(name) for name in motion.bodies]
-    assert np.abs(other.position[0, places] - motion.position[0]).max() <= STEPS
-
-
-def test_long_chain_moves_alike_in_a_turned_and_shifted_frame():
-    """Positions there, moved back by SHIFT and TURN_OF_FRAME, are those in the chain's own frame."""
-    motion, other = chain_after(), chain_after(frame)
-    moved_back = (other.position[0] - SHIFT) @ to_matrix(TURN_OF_FRAME)
-    assert np.abs(moved_back - motion.position[0]).max() <= STEPS
+def test_long_chain_moves_alike_in_another_order_and_in_a_turned_and_shifted_frame():
+    """Bodies, joints and loads of 20 four-bars, 41 bodies, are listed in another order, or turned and moved.
+    Positions of the latter, moved back, are those in the chain's own frame."""
+    scene = four_bar_chain(20)
+    scenes = scene, in_another_order(scene), in_another_frame(scene, TURN_OF_FRAME, SHIFT)
+    own, ordered, moved = (simulate(each, times=[0.02]) for each in scenes)
+    assert own.outcome is ordered.outcome is moved.outcome is Outcome.COMPLETED
+    places = [ordered.bodies.index(name) for name in own.bodies]
+    assert np.abs(ordered.position[0, places] - own.position[0]).max() <= STEPS
+    moved_back = (moved.position[0] - SHIFT) @ to_matrix(TURN_OF_FRAME)
+    assert np.abs(moved_back - own.position[0]).max() <= STEPS
 
 
 def test_wheels_of_a_long_row_of_gears_turn_by_the_drivers_angle_with_alternating_signs():

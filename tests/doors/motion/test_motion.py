@@ -78,6 +78,14 @@ def test_saved_motion_is_read_back_equal(crank, tmp_path):
     assert list(again.columns()) == list(crank.columns())
 
 
+def test_motion_is_saved_as_json_only(crank, tmp_path):
+    """The suffix may have capitals; with another one no file is written."""
+    with pytest.raises(ValueError, match=r"run.mp4: a motion is saved as .json"):
+        crank.save(tmp_path / "run.mp4")
+    crank.save(tmp_path / "run.JSON")
+    assert [path.name for path in tmp_path.iterdir()] == ["run.JSON"]
+
+
 FAULTS = {"t_end": "soon", "angles": {"A": [0.0]}, "cost": {"steps": "3"}, "bodies": {}, "times": [10**400]}
 
 

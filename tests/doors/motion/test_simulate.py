@@ -5,12 +5,15 @@ import re
 import numpy as np
 import pytest
 
+from mbref import diagnose
+from mbref.input_error import InputError
 from mbref.method import Method, MethodError
 from mbref.scene import Body, Driver, Revolute, Scene, SceneError, Sine, TorsionSpring, Translational
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
 
 FINE = Limits(rtol=1e-11)
+PENDULUM = SCENES["point_pendulum"]().with_(duration=0.2)
 ROD = {"mass": 2.0, "inertia": (0.1, 0.7, 0.7)}
 AXLE = Revolute(name="H", bodies=("ground", "b"), anchor=(1, 0, 0), axis=(1, 0, 0))
 
@@ -163,3 +166,55 @@ def test_taylor_with_a_formulation_and_orders_above_30_are_refused():
         Method.parse("lm1+none/taylor[order=8]")
     with pytest.raises(ValueError, match="order must be 4 to 30, got 31"):
         simulate(SCENES["point_pendulum"](), "taylor[order=31]", [0.1])
+
+
+def test_diagnosis_takes_a_file_s_name_a_built_in_name_or_a_scene(tmp_path):
+    """The file has the pendulum; a name of neither a file nor a built-in scene is refused."""
+    PENDULUM.save(tmp_path / "pendulum.toml")
+    assert diagnose(str(tmp_path / "pendulum.toml")) == diagnose(PENDULUM) == diagnose(PENDULUM.with_())
+    assert diagnose("four_bar").counts == diagnose(SCENES["four_bar"]()).counts
+    with pytest.raises(SceneError, match="unknown scene 'no_such_scene'"):
+        diagnose("no_such_scene")
+
+
+def test_duration_gives_a_run_101_samples_up_to_its_end():
+    """The run equals one at 101 equidistant times."""
+    run = simulate(PENDULUM, "lm1+none", duration=0.1)
+    assert run.times[-1] == 0.1 and len(run.times) == 101, run.times
+    given = simulate(PENDULUM, "lm1+none", np.linspace(0.0, 0.1, 101))
+    assert np.array_equal(run.position, given.position)
+
+
+def test_argument_rtol_of_simulate_equals_rtol_of_limits():
+    """A tolerance of 1e-10 takes more steps than 1e-3; both ways of giving it lead to equal bits."""
+    loose, fine = (simulate(PENDULUM, "lm1+none", [2.0], rtol=rtol) for rtol in (1e-3, 1e-10))
+    assert fine.cost.steps > loose.cost.steps, "the tolerance was not taken"
+    same = simulate(PENDULUM, "lm1+none", [2.0], Limits(rtol=1e-10))
+    assert np.array_equal(same.position, fine.position)
+
+
+def test_duration_together_with_sample_times_is_refused():
+    """The duration would be 0.2 s, the only sample time is 0.1 s."""
+    with pytest.raises(ValueError, match="give sample times or a duration, not both"):
+        simulate(PENDULUM, "lm1+none", [0.1], duration=0.2)
+
+
+@pytest.mark.parametrize(
+    ("times", "says"),
+    [
+        ([], "needs at least one sample time"),
+        ([[0.0, 0.1]], "needs at least one sample time"),
+        ([0.1, 0.1], "must be finite, not negative and increasing"),
+        ([0.2, 0.1], "must be finite, not negative and increasing"),
+        ([-0.1, 0.1], "must be finite, not negative and increasing"),
+        ([0.0, float("nan")], "must be finite, not negative and increasing"),
+        (["soon"], "must be numbers"),
+        ([10**400], "must be numbers"),
+        ([[0.0], [1.0, 2.0]], "must be numbers"),
+    ],
+)
+def test_times_of_simulate_that_are_no_samples_are_refused(times, says):
+    """Refused are no time, lists of lists, equal, falling, negative and undefined times (NaN), texts, and a
+    number that no float can hold."""
+    with pytest.raises(InputError, match=f"^times: {says}$"):
+        simulate("four_bar", times=times)
