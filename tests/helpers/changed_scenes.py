@@ -46,3 +46,10 @@ def in_another_order(scene: Scene) -> Scene:
     """Return the scene with bodies, joints, loads, drivers and couplings in reverse order."""
     kinds = ("body", "joint", "load", "driver", "coupling")
     return scene.with_(**{kind: getattr(scene, kind)[::-1] for kind in kinds})
+
+
+def bumped(array: np.ndarray, sample: int, body: int, by: np.ndarray) -> np.ndarray:
+    """Return an array (k, nb, n) of a motion with the row of a body at a sample changed by a vector."""
+    found = array.copy()
+    found[sample, body] += by
+    return found

@@ -1,5 +1,6 @@
 """Mechanisms with couplings and armatures, of which some have closed forms."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,11 @@ def gear_pair(**changes: Any) -> Scene:
         "load": [{"type": "moment", "body": "pinion", "moment": [0.0, 0.0, 2.0]}],
     }
     return Scene(**{**scene, **changes})
+
+
+def shifted(make: Callable[[], Scene], name: str, offset: float) -> Scene:
+    """Return a scene with the offset (m or rad) of one of its couplings."""
+    return make().with_(f"coupling[{name}].offset", offset)
 
 
 def rack() -> Scene:

@@ -17,6 +17,19 @@ def pendulum(**changes):
     return Scene(**({"name": "pendulum", "body": (bar,), "joint": (pivot,)} | changes))
 
 
+def door(tilt: float, seed: int = 0) -> Scene:
+    """Return a door on two hinges, the second tilted (rad), in a random orientation unless the seed is 0."""
+    turn = rotations.from_vector(np.random.default_rng(seed).normal(size=3) if seed else np.zeros(3))
+    turned = lambda *vector: tuple(map(float, rotations.rotate(turn, np.array(vector))))  # noqa: E731
+    pose = {"position": turned(0.5, 0.0, 0.5), "orientation": tuple(turn)}
+    body = Body(name="door", mass=1.0, inertia=(0.1, 0.2, 0.15), **pose)
+    hinges = tuple(
+        Revolute(name=name, bodies=("ground", "door"), anchor=turned(0.0, 0.0, z), axis=turned(x, 0.0, 1.0))
+        for name, z, x in (("A", 0.0, 0.0), ("B", 1.0, tilt))
+    )
+    return Scene(name="door", gravity=turned(0.0, -9.81, 0.0), body=(body,), joint=hinges)
+
+
 def block(**changes):
     """A body on an inclined line."""
     body = Body(name="block", mass=2.0, inertia=(0.1, 0.1, 0.1), position=(1.0, 2.0, 3.0))

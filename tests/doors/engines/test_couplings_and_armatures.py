@@ -14,7 +14,7 @@ from crosscheck.judge.truth import truth_for
 from crosscheck.recorded.exact import reference_table
 from crosscheck.recorded.judgement import judge_motion
 from mbref import formats
-from mbref.scene import Scene, SceneError
+from mbref.scene import SceneError
 from tests.helpers.coupled_mechanisms import (
     EVERY,
     coupled_loops,
@@ -22,6 +22,7 @@ from tests.helpers.coupled_mechanisms import (
     pendulum,
     planetary,
     rack,
+    shifted,
     spatial_chain,
 )
 
@@ -122,11 +123,6 @@ BEST = {
     "exudyn": Setting("tuned", {"step": 1e-3}),
 }
 ROUNDED = 1e-13  # m or rad; of angles and lengths up to 20 rad and 1 m
-
-
-def shifted(make, name: str, offset: float) -> Scene:
-    """Return a scene with the offset (m or rad) of one of its couplings."""
-    return make().with_(f"coupling[{name}].offset", offset)
 
 
 @pytest.mark.parametrize("factor", [0.5, -1.0, 1.0 + 1e-9], ids=["half", "opposite", "1e-9 more"])

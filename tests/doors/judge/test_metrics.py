@@ -15,19 +15,13 @@ from crosscheck.judge.truth import NoSolution, truth_for
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Moment
 from mbref.scenes import SCENES
+from tests.helpers.changed_scenes import bumped
 from tests.helpers.measured import MARGIN
 from tests.helpers.truth_scenes import SPRUNG, free, pendulum
 
 SCENE = SCENES["planar_slider_crank_gravity"]()
 TRUTH = truth_for(SCENE)
 EXACT = TRUTH.poses(np.linspace(0, 0.2, 21))
-
-
-def bumped(array, sample, body, bump):
-    """A copy of a trajectory array with one body's row changed at one sample."""
-    changed = array.copy()
-    changed[sample, body] += bump
-    return changed
 
 
 def test_work_of_a_moment_across_the_turning_axis_is_its_power_integrated():

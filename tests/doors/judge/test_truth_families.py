@@ -11,7 +11,7 @@ from mbref.scene import Body, Driver, Revolute, Scene, Spherical, Universal
 from mbref.scenes import SCENES
 from mbref.scenes.planar_slider_crank import planar_slider_crank, slider_crank
 from tests.helpers.parts import Z
-from tests.helpers.truth_scenes import ALL, CLOSED, free, pendulum
+from tests.helpers.truth_scenes import ALL, CLOSED, door, free, pendulum
 
 ROUNDED = 1e-13  # m or rad; roundings of 1, and their growth along the motion
 FAMILY = {  # beginning of a scene's name: the judge's closed form
@@ -153,15 +153,6 @@ def test_slider_crank_with_a_gap_of_3e_13_folds_as_with_1e_9():
         for gap in (3e-13, 1e-9, 0.0)
     )
     assert np.abs(narrow - wide).max() < 1e-4 and np.abs(narrow - straight).max() > 0.02
-
-
-def door(tilt):
-    """A body on two hinges, the axis of the second tilted (rad)."""
-    body = Body(name="door", position=(0.5, 0.0, 0.5), mass=1.0, inertia=(0.1, 0.2, 0.15))
-    axes = {"A": (0.0, (0.0, 0.0, 1.0)), "B": (1.0, (tilt, 0.0, 1.0))}
-    pair = ("ground", "door")
-    hinges = [Revolute(name=n, bodies=pair, anchor=(0, 0, z), axis=axis) for n, (z, axis) in axes.items()]
-    return Scene(name="door", gravity=(0, -9.81, 0), body=(body,), joint=hinges)
 
 
 def test_door_on_tilted_hinges_stays_and_on_aligned_ones_swings():

@@ -19,7 +19,7 @@ from crosscheck.judge.truth import Truth
 from mbref import rotations
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Body, Scene
-from tests.helpers.changed_scenes import in_another_frame, in_another_order, in_other_units
+from tests.helpers.changed_scenes import bumped, in_another_frame, in_another_order, in_other_units
 from tests.helpers.parts import SKEW, Z, block, hinge, turning_about
 from tests.helpers.short_motions import GRAVITY, MOTIONS, made
 
@@ -64,13 +64,6 @@ def measured(make, **arrays: np.ndarray) -> Mapping[str, float | None]:
     return measure(scene, replace(exact, **arrays), truth)
 
 
-def changed(array: np.ndarray, sample: int, body: int, by: np.ndarray) -> np.ndarray:
-    """Return an array (k, nb, n) with the row of a body at a sample changed by a vector."""
-    found = array.copy()
-    found[sample, body] += by
-    return found
-
-
 GEARS, CRANK = MOTIONS["gears with armature"], MOTIONS["planar_slider_crank_gravity"]
 MAKERS = [double_hinge, flying, GEARS, CRANK]
 of_each_maker = pytest.mark.parametrize("make", MAKERS, ids=["hinges", "flying", "gears", "slider-crank"])
@@ -97,7 +90,7 @@ LENGTHS = {  # m; largest distance between anchors and centres of mass at the st
 @pytest.mark.parametrize("sample", [0, 5, SAMPLES - 1])
 def test_a_shift_is_measured_in_lengths_of_the_mechanism(make, sample):
     """The last body is shifted by 13 mm at one sample; scd is -log₁₀ of the error, its correct digits."""
-    found = measured(make, position=changed(exact_of(make)[2].position, sample, -1, SHIFT))
+    found = measured(make, position=bumped(exact_of(make)[2].position, sample, -1, SHIFT))
     assert found["position_error"] == pytest.approx(SHIFTED / LENGTHS[make], rel=CLOSE)
     assert found["error"] == found["position_error"] and found["rotation_error"] < ROUNDING
     assert found["scd"] == pytest.approx(-math.log10(SHIFTED / LENGTHS[make]))
@@ -155,7 +148,7 @@ def test_violation_of_a_joint_is_a_component_of_the_gap_that_is_put_in_at_every_
     """Three rows of a hinge are components of its gap or of its rates: the largest is at least 1/√3 of it."""
     _, _, exact = exact_of(double_hinge)
     for level, factor in (("position", 1), ("velocity", 10), ("acceleration", 100)):
-        moved = changed(getattr(exact, level), 3, 1, factor * SHIFT)
+        moved = bumped(getattr(exact, level), 3, 1, factor * SHIFT)
         found = measured(double_hinge, **{level: moved})[f"violation_{level}"]
         size = factor * SHIFTED / LENGTHS[double_hinge]
         assert size / math.sqrt(3) <= found <= size * (1 + CLOSE)
@@ -172,8 +165,8 @@ def test_violation_of_gears_that_slip_is_their_angle_and_its_rate():
     found = measured(GEARS, orientation=orientation, position=place)
     assert found["violation_position"] == pytest.approx(0.02, rel=CLOSE)
     assert found["rotation_error"] == pytest.approx(0.02, rel=CLOSE)
-    spin = changed(exact.angular_velocity, 4, 1, 0.3 * np.array(Z))
-    velocity = changed(exact.velocity, 4, 1, np.cross(0.3 * np.array(Z), exact.position[4, 1] - centre))
+    spin = bumped(exact.angular_velocity, 4, 1, 0.3 * np.array(Z))
+    velocity = bumped(exact.velocity, 4, 1, np.cross(0.3 * np.array(Z), exact.position[4, 1] - centre))
     found = measured(GEARS, angular_velocity=spin, velocity=velocity)
     assert found["violation_velocity"] == pytest.approx(0.3, rel=CLOSE)
 
@@ -195,7 +188,7 @@ def test_momentum_drift_of_a_pushed_body_is_the_change_of_its_momentum():
     """1.5 kg at 3 m/s get 0.9 m/s across: 1.5 · 0.9 of the largest 1.5 √(3² + 0.9²) kg m/s."""
     scene, _, exact = exact_of(flying)
     across = np.array([0.0, 1.0, 1.0]) / math.sqrt(2)
-    off = momentum_series(scene, replace(exact, velocity=changed(exact.velocity, 6, 0, 0.9 * across)))
+    off = momentum_series(scene, replace(exact, velocity=bumped(exact.velocity, 6, 0, 0.9 * across)))
     assert off[6] == pytest.approx(0.9 / math.hypot(3.0, 0.9)) and np.delete(off, 6).max() < ROUNDING
 
 
@@ -246,7 +239,7 @@ def by_gate(make, field: str, times: float):
     """Return the gate's difference of the true run and one with ``times`` the vector of START added."""
     scene, run = make(), short_run(make)
     name, sample, size = START[field]
-    off = changed(getattr(run, name), sample, -1, times * size * AXIS)
+    off = bumped(getattr(run, name), sample, -1, times * size * AXIS)
     return gate(scene, [run, replace(run, engine="other", **{name: off})])
 
 

@@ -16,6 +16,7 @@ from tests.helpers.coupled_mechanisms import (
     planetary,
     rack,
     screw,
+    shifted,
     spatial_chain,
 )
 
@@ -34,10 +35,6 @@ EVERY = (
 every = pytest.mark.parametrize(
     ("make", "name", "offset"), EVERY, ids=[f"{make.__name__} {offset}" for make, _, offset in EVERY]
 )
-
-
-def shifted(make, name: str, offset: float) -> Scene:
-    return make().with_(f"coupling[{name}].offset", offset)
 
 
 def error(found: np.ndarray, exact: np.ndarray) -> float:

@@ -10,6 +10,7 @@ import pytest
 import mbref
 from crosscheck.judge.truth import closed_form, truth_for
 from mbref.scene import Scene
+from tests.helpers.four_bars import crank_pins
 from tests.helpers.parts import Z, hinge, rod, turning_about
 from tests.helpers.spinning import spinning_mechanism
 
@@ -21,23 +22,11 @@ PARTS = (0.9998, 0.99, 0.5, 1.0002, 1.5)  # angle of the crank at the start / ha
 ALL_STEPS = (1e-4, 5e-4, 1e-3, 2e-3, 3e-3, 5e-3)  # s
 
 
-def pin(lengths: tuple[float, ...], angle: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the pins B and C (…, 2) of a four-bar at angles of its crank; ``side`` is the branch."""
-    crank, coupler, rocker, ground = lengths
-    b = crank * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    across = np.array([ground, 0.0]) - b
-    apart = np.linalg.norm(across, axis=-1, keepdims=True)
-    along = (coupler**2 - rocker**2 + apart**2) / (2 * apart)
-    height = np.sqrt(np.maximum(coupler**2 - along**2, 0.0))
-    unit = across / apart
-    return b, b + along * unit + side * height * np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
-
-
 def crank_rocker(lengths: tuple[float, ...], angle: float) -> Scene:
     """Return a four-bar of rods, 1 kg/m, that moves freely, with the crank at an angle, rad. The velocities
     of coupler and rocker follow from the crank's."""
     a, d = (0.0, 0.0, 0.0), (lengths[3], 0.0, 0.0)
-    b, c = ((*place, 0.0) for place in pin(lengths, np.array(angle), 1.0))
+    b, c = ((*place, 0.0) for place in crank_pins(lengths, np.array(angle), 1.0))
     ends, names = ((a, b), (b, c), (d, c)), ("crank", "coupler", "rocker")
     bodies = [rod(name, p, q, math.dist(p, q)) for name, (p, q) in zip(names, ends, strict=True)]
     bodies[0] = turning_about(a, Z, RATE, bodies[0])
@@ -53,7 +42,7 @@ def deviation(lengths: tuple[float, ...], angle: float, step: float) -> float:
     assert motion.outcome is mbref.Outcome.COMPLETED, motion.message
     crank = angle + motion.joint("A").angle
     tip = 2 * motion.position[:, 2, :2] - np.array([lengths[3], 0.0])
-    apart = [np.linalg.norm(tip - pin(lengths, crank, side)[1], axis=1) for side in (1.0, -1.0)]
+    apart = [np.linalg.norm(tip - crank_pins(lengths, crank, side)[1], axis=1) for side in (1.0, -1.0)]
     return max(np.min(apart, axis=0).max(), np.abs(motion.energy / motion.energy[0] - 1).max())
 
 

@@ -9,7 +9,6 @@ from crosscheck.conformance.mechanisms.parts import linkage
 from crosscheck.judge.reaction_balance import with_exact_reactions
 from crosscheck.judge.truth import closed_form
 from crosscheck.study import stability
-from mbref import rotations
 from mbref.scene import GROUND, Body, Driver, Fixed, Revolute, Scene, Translational
 from mbref.scenes import find_scene
 from mbref.scenes.five_bar import five_bar_gravity
@@ -17,6 +16,7 @@ from mbref.scenes.four_bar import four_bar, four_bar_gravity, parallelogram
 from mbref.scenes.planar_slider_crank import slider_crank
 from mbref.simulation.simulate import Limits, simulate
 from tests.helpers.measured import relative_error
+from tests.helpers.truth_scenes import door
 
 SWINGING = {"four": four_bar_gravity, "five": five_bar_gravity}  # released from rest at an angle (rad)
 RTOL = 1e-9  # the default of runs
@@ -33,19 +33,6 @@ def test_light_crank_turns_through_dead_centres_of_a_heavy_slider(ratio, allowed
     closed form are below 10 and 500 rtol: five times the largest found."""
     scene = next(scene for scene in stability.scenes() if scene.name == f"mass_ratio[{ratio}]")
     assert error_of(scene, scene.duration) < allowed
-
-
-def door(tilt: float, seed: int) -> Scene:
-    """Return a door on two hinges, the second tilted (rad), in a random orientation unless the seed is 0."""
-    turn = rotations.from_vector(np.random.default_rng(seed).normal(size=3) if seed else np.zeros(3))
-    turned = lambda *vector: tuple(map(float, rotations.rotate(turn, np.array(vector))))  # noqa: E731
-    pose = {"position": turned(0.5, 0.0, 0.5), "orientation": tuple(turn)}
-    body = Body(name="door", mass=1.0, inertia=(0.1, 0.2, 0.15), **pose)
-    hinges = tuple(
-        Revolute(name=name, bodies=(GROUND, "door"), anchor=turned(0.0, 0.0, z), axis=turned(x, 0.0, 1.0))
-        for name, z, x in (("A", 0.0, 0.0), ("B", 1.0, tilt))
-    )
-    return Scene(name="door", gravity=turned(0.0, -9.81, 0.0), body=(body,), joint=hinges)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
