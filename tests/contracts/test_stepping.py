@@ -51,32 +51,27 @@ def test_every_evaluation_of_dop853_is_counted() -> None:
     assert stepper.counts.rhs == calls == expected, f"{calls} calls, {stepper.counts}, expected {expected}"
 
 
-def test_noise_in_one_stage_of_the_shortest_step_is_stepped_over() -> None:
-    """y' is 1, but 1e9 at the state that the sixth stage of the first, shortest step reaches: y(1) is 1. The
-    lengths of JUMPS are tried there, and each counts as a rejected step; no other step meets the noise."""
-    shortest = 1e-3
-    noisy = DOP853.C[5] * shortest
+SHORTEST, MOVED = 1e-3, 1e-9  # s, and the correction of a state
+
+
+@pytest.mark.parametrize(
+    ("noisy", "moved", "rtol"),
+    [
+        pytest.param(DOP853.C[5] * SHORTEST, 0.0, 1e-12, id="in a stage"),
+        pytest.param(SHORTEST + MOVED, MOVED, 1e-6, id="where the step is corrected"),
+    ],
+)
+def test_noise_in_the_shortest_step_is_stepped_over(noisy: float, moved: float, rtol: float) -> None:
+    """y' is 1, but 1e9 at the state of the sixth stage of the first, shortest step, or at the state to which
+    this step is corrected: the change of slope by the correction counts as an error of the step. The lengths
+    of JUMPS are tried there, each counts as a rejected step, and no other step meets the noise. Each
+    correction adds ``moved`` to y, so that y(1) is 1 plus ``moved`` for each step, to rounding."""
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
-        return np.array([1.0 if abs(y[0] - noisy) > 1e-9 else 1e9])
+        return np.array([1.0 if abs(y[0] - noisy) > MOVED / 2 else 1e9])
 
-    stepper = adaptive(rhs, 1e-12, min_step=shortest)
-    y = stepper.advance(np.zeros(1), 0.0, 1.0)
-    assert stepper.counts.rejected == len(JUMPS), f"{stepper.counts}"
-    assert abs(y[0] - 1.0) < 1e-12, f"y(1) = {y[0]}, expected 1"  # tolerance
-
-
-def test_noise_where_a_shortest_step_is_corrected_does_not_spoil_the_result() -> None:
-    """y' is 1, but 1e9 at the state to which the first, shortest step is corrected. The change of slope by
-    the correction counts as an error of the step: the lengths of JUMPS are tried, each counts as a rejected
-    step, and a longer one misses the noise. Each correction adds 1e-9 to y, so that y(1) is 1 plus 1e-9 for
-    each step, to rounding."""
-    shortest, moved = 1e-3, 1e-9
-
-    def rhs(t: float, y: np.ndarray) -> np.ndarray:
-        return np.array([1.0 if abs(y[0] - shortest - moved) > moved / 2 else 1e9])
-
-    stepper = Adaptive(rhs, lambda t, y: y + moved, 1e-6, shortest, np.inf, Counts())
+    correct = (lambda t, y: y + moved) if moved else None
+    stepper = Adaptive(rhs, correct, rtol, SHORTEST, np.inf, Counts())
     y = stepper.advance(np.zeros(1), 0.0, 1.0)
     assert stepper.counts.rejected == len(JUMPS), f"{stepper.counts}"
     assert abs(y[0] - 1.0 - moved * stepper.counts.steps) < 1e-12

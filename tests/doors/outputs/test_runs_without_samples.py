@@ -1,18 +1,33 @@
-"""Runs that reach no sample: their outcome is printed, and their tables and files are empty."""
+"""Runs that reach no sample: their outcome is printed, their tables and files are empty, and they have no
+metrics."""
 
 import csv
 import json
+import math
 
 import pytest
 
+import crosscheck
 import mbref
+from crosscheck.conformance.mechanisms.specimens import specimens
+from crosscheck.judge.openings import opening
+from crosscheck.processes.pool import end_idle
 from mbref import Motion
 from mbref.cli import main
 from mbref.motions.trajectory import Outcome, Trajectory
 from tests.fuzz.mutations import EVERYTHING
+from tests.helpers.geared_arms import arms
 
 # redundant rows, which this method cannot solve; the shorter the motion, the sooner its advice is found
 STUCK = ["planar_slider_crank", "--method", "lm1", "--duration", "0.01", "--samples", "3"]
+
+
+def failed(scene: mbref.Scene) -> Trajectory:
+    """Return the result of an engine that gives no sample of a scene."""
+    return Trajectory.failed(
+        scene=scene.name, engine="other", version="1", method="m", settings={},
+        bodies=tuple(body.name for body in scene.body), outcome=Outcome.CRASHED, message="ended",
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -72,12 +87,26 @@ def test_every_array_of_a_motion_without_samples_is_empty(stuck, tmp_path):
 def test_motion_of_another_engine_without_samples_has_empty_columns_of_all_parts():
     """The scene has five bodies, six types of joints and four loads, of which the last two are springs."""
     scene = mbref.Scene(**EVERYTHING)
-    failed = Trajectory.failed(
-        scene=scene.name, engine="other", version="1", method="m", settings={},
-        bodies=tuple(body.name for body in scene.body), outcome=Outcome.CRASHED, message="ended",
-    )  # fmt: skip
-    columns = Motion.of(scene, failed).columns()
+    columns = Motion.of(scene, failed(scene)).columns()
     assert all(values.shape == (0,) for values in columns.values())
     bodies = {f"{body.name}.position.x" for body in scene.body}
     parts = {"c.angle", "t.displacement", *(f"load({k}).power" for k in range(4)), "load(3).energy", "energy"}
     assert bodies | parts <= set(columns)
+
+
+def test_run_without_samples_has_no_metric_and_an_infinite_opening():
+    """On each mechanism of the conformance suite; gap (m) and angle (rad) are infinite."""
+    for scene in (each.scene for each in specimens()):
+        run = failed(scene)
+        assert set(crosscheck.measure(scene, run).values()) == {None}, scene.name
+        assert opening(scene, run) == (math.inf, math.inf, ()), scene.name
+
+
+def test_comparison_reports_an_engine_that_crashes_before_its_first_sample():
+    """Each run raises an error, and has a row, a sentence and a record, in JSON without NaN."""
+    scene = arms(1.0, coupled=True).with_(duration=0.1)
+    found = crosscheck.compare(scene, "tests.helpers.still_engines:FAILING", samples=3, reference_time=1.0)
+    end_idle()
+    assert [row["outcome"] for row in found.rows] == ["CRASHED"] and found.rows[0]["error"] is None
+    assert "still completes no run" in found.verdict.right and "crashed" in str(found)
+    assert json.loads(json.dumps(found.document(), allow_nan=False))["records"][0]["times"] == []
