@@ -68,7 +68,23 @@ def well_formed(answer: Any, scene: Scene, times: np.ndarray) -> Trajectory:
         t_end=_number("t_end", answer.t_end),
         reactions=_reactions(answer.reactions, scene, reached.size),
     )
-    return in_scene_order(scene, found)
+    return _finite(in_scene_order(scene, found))
+
+
+def _finite(run: Trajectory) -> Trajectory:
+    """Return a run that completed with numbers that are not finite as a failed one, with the samples before
+    them; return any other run as it is."""
+    samples = np.concatenate([getattr(run, name) for name in WIDTHS], axis=2)
+    is_finite = np.isfinite(samples).all(axis=(1, 2))
+    if run.outcome is not Outcome.COMPLETED or is_finite.all():
+        return run
+    k = int(is_finite.argmin())
+    body = run.bodies[int(np.isfinite(samples[k]).all(axis=1).argmin())]
+    message = f"the engine completed, but the motion of {body} is not finite at {run.times[k]:.6g} s"
+    arrays = {n: a[:k] for n in (*WIDTHS, *OPTIONAL, "times") if (a := getattr(run, n)) is not None}
+    reactions = run.reactions and {name: wrench[:k] for name, wrench in run.reactions.items()}
+    reached: dict[str, Any] = {**arrays, "reactions": reactions, "t_end": float(run.times[max(k - 1, 0)])}
+    return replace(run, outcome=Outcome.NOT_FINITE, message=message, **reached)
 
 
 def answered(simulator: Engine, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:

@@ -178,10 +178,7 @@ def _less_than_right(groups: Sequence[Judged], name: str) -> str:
     scene = max(found, key=lambda s: error(found[s]))
     place = "" if len(groups) == 1 else f" on {scene}"
     best = f"at best{_of_those_that_end(groups, scene, name)}"
-    is_off = f"off by {error_text(found[scene])}"
-    if not math.isfinite(error(found[scene])):
-        is_off = "its positions or orientations are not finite"
-    return f"{title(name)} is {graded[scene]} {best}{place}: {is_off}."
+    return f"{title(name)} is {graded[scene]} {best}{place}: off by {error_text(found[scene])}."
 
 
 def _of_those_that_end(groups: Sequence[Judged], scene: str, name: str) -> str:

@@ -1,7 +1,6 @@
 """Verdicts on records of known errors and times: grades and sentences, and changes between two sets."""
 
 import io
-import math
 import re
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -108,11 +107,6 @@ BOTH = [record("mujoco", COMPILED, 1e-9, 0.002), record("mujoco", TUNED, 1e-7, 0
 ROUGH = [BOTH[0], record("mujoco", TUNED, 1e-3, 0.05)]
 ENDED = record("exudyn", "defaults", 0.0, outcome="SINGULAR_MATRIX", t_end=0.0)
 SLOW = record("sundials", "ggl", None, 0.2, outcome="TIMED_OUT", t_end=0.0, time_limit=5.0)
-
-
-def test_a_completed_run_of_numbers_that_are_not_finite_is_said_to_have_them():
-    said = right([group([record("mujoco", "tuned", math.inf)])])
-    assert "MuJoCo is wrong at best: its positions or orientations are not finite." in said
 
 
 def of_two_scenes(here: Sequence[dict[str, Any]], there: Sequence[dict[str, Any]]) -> list[Judged]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting
-from crosscheck.processes.answer import MalformedAnswer, well_formed
+from crosscheck.processes.answer import OPTIONAL, MalformedAnswer, well_formed
 from crosscheck.study.grid import Case, study
 from mbref.motions.trajectory import PER_BODY, Cost, Outcome
 from mbref.scene import Body, Scene
@@ -66,6 +66,15 @@ def test_bodies_of_an_answer_are_put_into_the_scene_s_order():
     turned = {name: getattr(good, name)[:, ::-1] for name in PER_BODY if getattr(good, name) is not None}
     run = well_formed(replace(good, bodies=good.bodies[::-1], **turned), scene, TIMES)
     assert run.bodies == ("block", "plate") and np.array_equal(run.position, good.position)
+
+
+@pytest.mark.parametrize("name", [name for name in PER_BODY if name not in OPTIONAL])
+def test_a_run_that_completed_with_numbers_that_are_not_finite_has_failed(name: str):
+    good = FAKE.run(SCENE, TIMES, Setting("a"))
+    bad = np.where(TIMES[:, None, None] < 0.2, getattr(good, name), np.nan)
+    run = well_formed(replace(good, **{name: bad}), SCENE, TIMES)
+    assert (run.outcome, run.t_end, run.times.tolist()) == (Outcome.NOT_FINITE, 0.1, [0.0, 0.1])
+    assert "motion of block is not finite at 0.3 s" in run.message
 
 
 def test_a_completed_run_of_zero_seconds_is_a_well_formed_answer():
