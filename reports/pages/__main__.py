@@ -1,12 +1,13 @@
 """`python -m reports.pages [NAME …]`: write pages of the documentation from stored records.
 
-Without names it writes all pages into docs/results of the checkout.
+Without names it writes all pages into docs/results of the checkout. With the page on findings it writes a
+script for each proof into findings/.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 
@@ -22,6 +23,7 @@ NAMES = (
 )
 TEMPLATES = Path(__file__).parents[1] / "templates"  # texts of the pages, with names of parts in braces
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
+PROOFS = Path(__file__).parents[2] / "findings"
 
 
 def text(name: str, records: Path | None = None) -> str:
@@ -30,6 +32,13 @@ def text(name: str, records: Path | None = None) -> str:
     parts = page.parts(*([] if records is None else [records]))
     made = {name: part if isinstance(part, str) else body(part) for name, part in parts.items()}
     return (TEMPLATES / f"{name}.md").read_text(encoding="utf-8").format(**made)
+
+
+def proofs() -> Mapping[Path, str]:
+    """Return the scripts that prove findings without crosscheck, by their paths."""
+    page = import_module(f"{__package__}.findings")
+    made = page.scripts((TEMPLATES / "finding.sh").read_text(encoding="utf-8"))
+    return {PROOFS / f"{name}.sh": script for name, script in made.items()}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -47,7 +56,18 @@ def _write(argv: Sequence[str] | None) -> int:
         path = options.out or RESULTS / f"{name}.md"
         write(path, text(name, options.records))
         print(f"written: {path}", file=sys.stderr)
+        if path == RESULTS / "findings.md":
+            _write_proofs()
     return 0
+
+
+def _write_proofs() -> None:
+    for path in PROOFS.glob("*.sh"):
+        path.unlink()
+    for path, script in proofs().items():
+        write(path, script)
+        path.chmod(0o755)
+    print(f"written: {PROOFS}/*.sh", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -1,12 +1,17 @@
-"""The page on findings in other engines."""
+"""The page on findings in other engines, and the scripts that prove them without crosscheck."""
 
 from __future__ import annotations
 
 import math
+import textwrap
+from collections.abc import Mapping
 
 from crosscheck.findings.finding import FOLDER, Finding, When, findings
 
 from ..blocks import Block, Fold, Heading, Listing, Parts, Prose, Table, Within
+
+DIFFERENT = 0.1  # relative difference of a number from the stated one that counts as a change
+WIDTH = 118  # of a comment
 
 
 def parts() -> Parts:
@@ -14,6 +19,25 @@ def parts() -> Parts:
     rows = [(Within(f.name, f"#{f.name}"), f.engine, f.version, _measured(f)) for f in findings()]
     table = Table("Findings by engine.", ("finding", "engine", "version", "measured"), rows)
     return {"table": [table], "findings": [block for found in findings() for block in _entry(found)]}
+
+
+def scripts(template: str) -> Mapping[str, str]:
+    """Return the shell scripts, by name, that prove the stored findings with the engine's package alone."""
+    return {found.name: template.format(**_fields(found)) for found in findings() if found.script}
+
+
+def _fields(found: Finding) -> Mapping[str, str]:
+    said = f"Does: {found.does}", f"Right: {found.right}", f"Cause: {found.cause}"
+    words = "\n".join(
+        textwrap.fill(each, WIDTH, initial_indent="# ", subsequent_indent="#   ") for each in said
+    )
+    if math.isnan(found.measured):
+        stated, holds = f"more than {found.wrong_above:g}", f"seen > {found.wrong_above!r}"
+    else:
+        most = DIFFERENT * abs(found.measured)
+        stated, holds = f"{found.measured:g}", f"abs(seen - {found.measured!r}) <= {most:g}"
+    names = {"name": found.name, "package": found.package, "version": found.version, "unit": found.unit}
+    return {**names, "words": words, "script": found.script.strip(), "stated": stated, "holds": holds}
 
 
 def _measured(found: Finding) -> str:

@@ -9,7 +9,7 @@ import pytest
 from crosscheck.cli import main as crosscheck
 from crosscheck.closed_loops.records import FILE
 from mbref.records import looked_at, rewrite
-from reports.pages.__main__ import NAMES, text
+from reports.pages.__main__ import NAMES, PROOFS, proofs, text
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 
@@ -24,6 +24,11 @@ def test_committed_page_follows_from_the_stored_records(page):
     """Each page of docs/results that is made from records is made again, and is equal letter by letter."""
     name, made = page
     assert (RESULTS / f"{name}.md").read_text() == made, f"python -m reports.pages {name} renews it"
+
+
+def test_committed_scripts_of_findings_follow_from_the_stored_findings():
+    """`python -m reports.pages findings` renews them."""
+    assert {path: path.read_text() for path in PROOFS.iterdir()} == proofs()
 
 
 def test_links_within_a_page_lead_to_its_headings_and_folded_runs(page):
