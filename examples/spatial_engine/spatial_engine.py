@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from crosscheck.engine import Cannot, Engine, Owner, Setting
+from crosscheck.engine import Cannot, Engine, Owner, Setting, Supports
 from crosscheck.judge.constraints import inertia_matrices, initial_twists
 from mbref import Cost, Outcome, Trajectory, rotations
 from mbref.rotations import cross
@@ -46,20 +46,15 @@ class Spatial(Engine):
 
     name = "spatial"
     package = "spatial-engine"
+    supports = Supports(tuple(HELD), ("angle", "displacement"), LOADS, massless_links=True)
 
     def version(self):
         return "0.1"
 
-    def cannot(self, scene):
+    def refuses(self, scene):
         if not scene.has_mass() or any(np.linalg.eigvalsh(i)[0] <= 0 for i in inertia_matrices(scene)):
             return Cannot(Owner.MODEL, "every body needs a mass and three moments of inertia")
-        unknown = [f"{joint.type} joints" for joint in scene.joint if joint.type not in HELD]
-        unknown += [f"{load.type} loads" for load in scene.load if load.type not in LOADS]
-        unknown += ["loads over time" for load in scene.load if load.over_time]
-        unknown += ["armatures" for joint in scene.joint if joint.reflected_inertia]
-        unknown += ["couplings"] * bool(scene.coupling)
-        unknown += ["drivers by a table" for driver in scene.driver if driver.table]
-        return Cannot(Owner.ADAPTER, f"no {unknown[0]}") if unknown else None
+        return None
 
     def settings(self, scene):
         return [Setting("dop853", {"rtol": r}) for r in (1e-5, 1e-7, 1e-9)]
