@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Setting
-from crosscheck.engines.mujoco import compiled_run, dampers, derivatives, linearised, original, stops
+from crosscheck.engines.mujoco import compiled_run, dampers, derivatives, linearised, original, pivots, stops
 from crosscheck.engines.mujoco.families import (
     CHOSEN,
     COMPILED,
@@ -64,10 +64,10 @@ class MuJoCo(linearised.Linearised, derivatives.Differentiated, Engine):
 
     def refuses(self, scene: Scene) -> Cannot | None:
         """Refuse scenes without masses whose motion the drivers do not determine completely, joints with
-        intervals that no equality of MuJoCo can switch, end stops that no limit can be, and point dampers
-        that no actuator can be."""
+        intervals that no equality of MuJoCo can switch, end stops that no limit can be, point dampers that
+        no actuator can be, and inertias below MuJoCo's least one."""
         refused = lacks_mass(at_start(scene)) or refusal(scene, "MuJoCo") or stops.refusal(scene)
-        return refused or dampers.refusal(at_start(scene))
+        return refused or dampers.refusal(at_start(scene)) or pivots.refusal(at_start(scene))
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
         """Return fixed steps chosen by the angle that a body turns in one step, and adaptive steps by

@@ -37,6 +37,16 @@ def test_mujoco_s_integrators_converge_with_their_order(family: str, order: int)
     assert abs(found - order) < 0.15, f"{family}: order {found:.2f}, errors {errors}"
 
 
+@pytest.mark.parametrize(("size", "is_refused"), [(0.9e-3, True), (1.1e-3, False)])
+def test_inertia_below_mujocos_least_one_is_refused_by_the_bodys_name(size: float, is_refused: bool) -> None:
+    """A rod of 3 µg that hangs by a pin at its end has m l²/3; MuJoCo computes with at least 1e-15 kg m²."""
+    moment = 3e-9 * size**2 / 12
+    body = Body(name="rod", mass=3e-9, inertia=(moment,) * 3, position=(size / 2, 0.0, 0.0))
+    refused = ENGINE.cannot(pendulum().with_(body=(body,)))
+    words = "a coordinate of body 'rod' moves an inertia below 1e-15"
+    assert words in refused.reason if is_refused else refused is None
+
+
 @pytest.mark.parametrize(("family", "evaluations"), [("stock", 4), ("euler", 1)])
 def test_mujoco_s_steps_divide_intervals_evenly_and_are_counted(family: str, evaluations: int) -> None:
     """Steps of at most 15 ms: 4 to 50 ms and 2 more to 75 ms; RK4 evaluates 4 times a step, Euler once."""
