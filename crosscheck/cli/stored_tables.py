@@ -153,12 +153,13 @@ def invariants(arguments: argparse.Namespace) -> int:
     if status := measured(arguments, "invariants", partial(kept.measure, report=notice)):
         return status
     runs = some(kept.read, arguments.records)
-    known = {column.experiment for column in laws.COLUMNS}
+    known = {column.experiment for column in (*laws.COLUMNS, *laws.OF_SOLVERS)}
     _name_left_out(runs, [record for record in runs if record["experiment"] in known])
     for title, found in laws.tables(runs).items():
-        table = Table("row", *(column.heading for column in laws.COLUMNS), title=title, box=SIMPLE)
+        columns = laws.columns_of(title)
+        table = Table("row", *(column.heading for column in columns), title=title, box=SIMPLE)
         for name, row in found.items():
-            table.add_row(name, *(laws.cell(row, column) for column in laws.COLUMNS))
+            table.add_row(name, *(laws.cell(row, column) for column in columns))
         console().print(table)
     return COMPLETED
 

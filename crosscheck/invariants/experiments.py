@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 
 SAMPLES = 41
+TOLERANCE = 1e-8  # of MuJoCo's solvers by default, rad²/s⁴
 LONG = 4.0  # s of runs whose momenta or energy are measured, at the spin SPIN
 Values = Mapping[str, float]
 
@@ -39,7 +41,8 @@ class Experiment(NamedTuple):
 
     ``make(x)`` is the mechanism at a value, and ``time(x)`` the factor by which its motion is slower.
     ``measure(scene, run, x, base)`` returns numbers that vanish in the exact motion by name. ``base`` is the
-    run at the first value, which only serves for comparison if ``compares``.
+    run at the first value, which only serves for comparison if ``compares``, or at each value the run with
+    the options ``exact``. ``changed(x, options)`` are options that depend on the value.
     """
 
     name: str
@@ -49,6 +52,8 @@ class Experiment(NamedTuple):
     values: Sequence[float] = ()
     time: Callable[[float], float] = lambda x: 1.0
     compares: bool = False
+    exact: Mapping[str, Any] = MappingProxyType({})
+    changed: Callable[[float, Mapping[str, Any]], Mapping[str, Any]] = lambda x, options: {}
 
     def first(self) -> Scene:
         """Return the mechanism for which an engine chooses its settings."""
@@ -58,7 +63,10 @@ class Experiment(NamedTuple):
         """Return the value or the fineness, and the setting, of every run of a family, coarse to fine."""
         if not self.values:
             return [(fineness(setting), setting) for setting in settings]
-        return [(x, slowed(settings[-1], self.time(x))) for x in self.values]
+        return [(x, self._at(x, slowed(settings[-1], self.time(x)))) for x in self.values]
+
+    def _at(self, x: float, setting: Setting) -> Setting:
+        return Setting(setting.family, {**setting.options, **self.changed(x, setting.options)})
 
 
 def times_of(scene: Scene) -> np.ndarray:
@@ -136,4 +144,34 @@ EXPERIMENTS = (
         compares=True,
     ),
     Experiment("steps", "step", lambda x: four_bar(), _error),
+)
+
+
+def _apart(scene: Scene, run: Trajectory, x: float, base: Trajectory) -> Values:
+    return {"motion": float(error_series(scene, run, base).max())}
+
+
+NEWTON = {"solver": "Newton", "tolerance": TOLERANCE}
+LARGE = 100.0  # m of the four-bar on which a solver's step is varied
+SOLVERS = (
+    Experiment(
+        "solver by size",
+        "size",
+        lambda size: resized(four_bar(), size),
+        _apart,
+        (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0),
+        math.sqrt,
+        exact=NEWTON,
+    ),
+    Experiment(
+        "solver by size and tolerance",
+        "size",
+        lambda size: resized(four_bar(), size),
+        _apart,
+        (1.0, 0.01, 0.1, 10.0, 100.0),
+        math.sqrt,
+        exact=NEWTON,
+        changed=lambda size, options: {"tolerance": options.get("tolerance", TOLERANCE) / size**2},
+    ),
+    Experiment("solver by step", "step", lambda x: resized(four_bar(), LARGE), _apart, exact=NEWTON),
 )

@@ -14,7 +14,7 @@ from mbref.motions.trajectory import Outcome
 
 ROUNDING = 1e-12  # values up to this are roundings of some thousand steps
 ANY = -math.inf  # least power of a law
-OTHER = "other"
+OTHER, SOLVERS = "other", "differences of a solver from Newton's at equal settings, by size and step"
 TITLES = {
     DEFAULTS: "by the library's defaults",
     BEST: "at the engine's best settings",
@@ -91,16 +91,49 @@ COLUMNS = (
         "error",
     ),
 )
+SIMILAR = "A four-bar swings under gravity, with steps in proportion to the time. "
+OF_SOLVERS = (
+    Column(
+        "size",
+        f"{SIMILAR}Difference at 100 m; power of the size, from 1 m to 1 km.",
+        "solver by size",
+        "motion",
+        100.0,
+        "m",
+    ),
+    Column(
+        "size and tolerance",
+        "Difference at 100 m with a tolerance in inverse proportion to the square of the size; power of the "
+        "size, from 1 cm to 100 m.",
+        "solver by size and tolerance",
+        "motion",
+        100.0,
+        "m",
+    ),
+    Column(
+        "step",
+        "Difference at 100 m at the finest step; power of the step.",
+        "solver by step",
+        "motion",
+    ),
+)
 
 
 def tables(records: Sequence[Record]) -> dict[str, dict[str, Sequence[Record]]]:
     """Return the records of each row of each table, by the table's title and the row's name."""
-    found: dict[str, dict[str, list[Record]]] = {title: {} for title in TITLES.values()}
+    found: dict[str, dict[str, list[Record]]] = {title: {} for title in (*TITLES.values(), SOLVERS)}
+    of_solvers = {column.experiment for column in OF_SOLVERS}
     for record in records:
         is_other = record["row"].split(", ", 1)[1] not in TITLES
         title = TITLES[OTHER if is_other else record["row"].split(", ", 1)[1]]
+        title = SOLVERS if record["experiment"] in of_solvers else title
         found[title].setdefault(record["row"], []).append(record)
     return {title: dict(rows) for title, rows in found.items() if rows}
+
+
+def columns_of(title: str) -> Sequence[Column]:
+    """Return the columns of a table."""
+    return OF_SOLVERS if title == SOLVERS else COLUMNS
 
 
 def of_column(records: Sequence[Record], column: Column) -> list[Record]:

@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, model_validator
 
 from crosscheck.engine import Cannot, Engine, Owner, Setting, engine
-from crosscheck.invariants.experiments import EXPERIMENTS, Experiment, times_of
+from crosscheck.invariants.experiments import EXPERIMENTS, SOLVERS, Experiment, times_of
 from crosscheck.processes.pool import end_idle, run_isolated
 from crosscheck.study import store
 from crosscheck.study.grades import DEFAULTS
@@ -40,11 +40,17 @@ class Row:
         changed = ", ".join(f"{name} {value}" for name, value in self.options.items())
         return f"{self.engine}, {self.family}" + f" ({changed})" * bool(changed)
 
+    @property
+    def experiments(self) -> Sequence[Experiment]:
+        """Experiments of the row: those on solvers, too, if its options name a solver."""
+        return (*EXPERIMENTS, *SOLVERS) if "solver" in self.options else EXPERIMENTS
+
 
 OTHERS = (
     *(Row("mujoco", DEFAULTS, {"integrator": name}) for name in ("RK4", "implicit", "discrete")),
     *(Row("mujoco", family) for family in ("stock", "euler", "implicit", "discrete")),
-    Row("mujoco", "chosen", {"solver": "CG", "iterations": 100, "tolerance": 1e-8, "warm": True}),
+    Row("mujoco", "stock", {"solver": "CG"}),
+    Row("mujoco", "stock", {"solver": "CG", "tolerance": 1e-6}),
     *(Row("pinocchio", family) for family in ("lcaba", "admm", "pgs")),
     Row("exudyn", "alpha"),
 )
@@ -95,14 +101,15 @@ def rows_of(name: str) -> list[Row]:
 def measure(engines: Sequence[str], path: Path = FILE, report: Callable[[str], None] = print) -> None:
     """Make the runs of the engines' rows that the file lacks; ``report`` gets a line for each experiment.
 
-    Records of another version of an engine are replaced.
+    Records of another version of an engine are replaced, and records of unlisted rows are dropped.
     """
     known = {record["key"]: record for record in read(path)}
     for name in engines:
         version = engine(name).version()
-        known = {k: r for k, r in known.items() if r["engine"] != name or r["version"] == version}
+        asked = {(version, row.name) for row in rows_of(name)}
+        known = {k: r for k, r in known.items() if r["engine"] != name or (r["version"], r["row"]) in asked}
         for row in rows_of(name):
-            for experiment in EXPERIMENTS:
+            for experiment in row.experiments:
                 if not any(_is_of(record, row, experiment) for record in known.values()):
                     known |= {record["key"]: record for record in made(row, experiment)}
                     rewrite(path, known.values())
@@ -117,9 +124,10 @@ def _is_of(record: Record, row: Row, experiment: Experiment) -> bool:
 def made(row: Row, experiment: Experiment) -> Iterator[Record]:
     """Yield the record of each run of an experiment, or the record of a refusal."""
     asked, scene = engine(row.engine), experiment.first()
-    settings = [Setting(s.family, {**s.options, **row.options}) for s in _settings(asked, row)(scene)]
     cannot = asked.cannot(scene)
-    if cannot or not settings:
+    offered = [] if cannot else _settings(asked, row)(scene)
+    settings = [Setting(s.family, {**s.options, **row.options}) for s in offered]
+    if not settings:
         unserved = Cannot(Owner.ADAPTER, f"the family {row.family} does not serve this mechanism")
         yield _record(asked, row, experiment) | {"outcome": REFUSED, "message": (cannot or unserved).reason}
         return
@@ -130,8 +138,12 @@ def made(row: Row, experiment: Experiment) -> Iterator[Record]:
         scene = experiment.make(x)
         run = run_isolated(row.engine, scene, times_of(scene), setting, TIME_LIMIT)
         record = last = _record(asked, row, experiment) | _of_run(x, setting, run)
+        if experiment.exact:
+            exact = Setting(setting.family, {**setting.options, **experiment.exact})
+            base = run_isolated(row.engine, scene, times_of(scene), exact, TIME_LIMIT)
         if run.outcome is Outcome.COMPLETED:
             base = base or run
+        if run.outcome is Outcome.COMPLETED and base is not None and base.outcome is Outcome.COMPLETED:
             record["values"] = in_digits(dict(experiment.measure(scene, run, x, base)))
         yield record | {"key": f"{record['key']} {x:g}"}
 

@@ -65,6 +65,7 @@ FAMILIES = {
     "hard closures where `hard` is given, else the library's",
 }
 INTEGRATED_HERE = (*ADAPTIVE, *COMPILED)
+SOLVING = ("solver", "tolerance", "iterations")  # options that the families of STOCK take
 SOLVERS = {
     "jacobian": "dense, sparse or auto",
     "islands": "whether islands are solved apart",
@@ -169,6 +170,7 @@ def own_code(setting: Setting) -> str:
     flags = {"autoreset": "disable"}
     integrator = STOCK.get(family, RK4).removeprefix("mjINT_")
     attributes |= {"integrator": NAMES.get(integrator, integrator), "jacobian": "dense"}
+    attributes |= {name: str(options[name]) for name in SOLVING if name in options and family in STOCK}
     flags["island"] = "disable"
     if family in STOCK:
         return _option(attributes, flags) + _closures(2 * step, 1.0)

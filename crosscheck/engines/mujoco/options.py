@@ -17,6 +17,7 @@ def change(mujoco: Any, model: Any, options: Mapping[str, Any]) -> None:
     have."""
     model.opt.timestep = float(options.get("step", model.opt.timestep))
     model.opt.iterations = int(options.get("iterations", model.opt.iterations))
+    model.opt.tolerance = float(options.get("tolerance", model.opt.tolerance))
     keywords = {
         "integrator": mujoco.mjtIntegrator,
         "solver": mujoco.mjtSolver,

@@ -21,6 +21,7 @@ from crosscheck.engines.mujoco.families import (
     INTEGRATED_HERE,
     MOST_ITERATIONS,
     RK4,
+    SOLVING,
     STIFFEST,
     STOCK,
 )
@@ -78,6 +79,8 @@ class Simulation:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
         if setting.family in STOCK:
             model.eq_solref[:], model.eq_solimp[:] = (2 * self.nominal, 1.0), STIFFEST
+            own = {name: options[name] for name in SOLVING if name in options}
+            change_options(mujoco, model, own)
         elif setting.family in ("tuned", "stiff", *INTEGRATED_HERE):
             self._harden(options.get("beta", 0.0), options.get("hard", HARD))
         else:

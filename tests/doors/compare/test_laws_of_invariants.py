@@ -4,9 +4,15 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance import suite, trial
+from crosscheck.conformance.mechanisms.invariant import resized
 from crosscheck.conformance.mechanisms.specimens import Specimen, specimens
 from crosscheck.conformance.runners import InProcess
+from crosscheck.engine import Setting, engine
+from crosscheck.invariants.experiments import EXPERIMENTS, four_bar, times_of
 from crosscheck.invariants.laws import COLUMNS, cell
+from crosscheck.invariants.records import Row, made
+from crosscheck.judge.metrics import error_series
+from tests.helpers.falling_engine import Falling
 from tests.helpers.low_order_engines import euler, low_order, symplectic_euler
 
 STEPS = COLUMNS[-1]  # the column of errors at the finest step
@@ -41,3 +47,31 @@ def test_explicit_euler_feeds_energy_into_a_tumbling_body_and_symplectic_euler_d
     body = next(each.scene for each in specimens() if each.scene.name == "tumbling body")
     bench = trial.set_up(InProcess(low_order(step, parts=(10, 20))), Specimen(body, keeps="energy"))
     assert suite.verdict_on("passive", bench).status == status
+
+
+class Jointless(Falling):
+    """Maps no joints, and has no settings for a mechanism that it refuses."""
+
+    def settings(self, scene):
+        raise ValueError(f"{scene.name} is refused")
+
+
+JOINTLESS = Jointless()
+
+
+def test_a_refused_mechanism_is_recorded_without_its_settings():
+    """All experiments are about mechanisms with joints, so that each has one record with the reason."""
+    row = Row(f"{__name__}:JOINTLESS", "best")
+    assert [record["outcome"] for each in EXPERIMENTS for record in made(row, each)] == ["REFUSED"] * 6
+
+
+def test_an_error_of_cg_depends_on_tolerance_times_the_square_of_the_size():
+    """MuJoCo's tolerance of hinges has the unit rad²/s⁴, and accelerations fall as 1 / size, so that the size
+    and the tolerance of a similar motion that is off by as much are (1, ε) and (s, ε / s²)."""
+    offs = []
+    for size, tolerance in ((1.0, 1e-6), (10.0, 1e-8), (10.0, 1e-6)):
+        scene, step = resized(four_bar(), size), {"step": 1e-3 * size**0.5}
+        ways = ({}, {"solver": "CG", "tolerance": tolerance})
+        runs = [engine("mujoco").run(scene, times_of(scene), Setting("stock", step | way)) for way in ways]
+        offs.append(error_series(scene, *runs).max())
+    assert offs[1] == pytest.approx(offs[0], rel=1e-3) and offs[2] > 3 * offs[0] > 1e-4, offs
