@@ -19,7 +19,9 @@ LCABA, TYPICAL_MU = "lcaba", 1e-6  # the value of mu that its documentation call
 ADMM, PGS = "admm", "pgs"
 ANCHORED = (ADMM, PGS)
 PROXIMAL = ("defaults", "proximal", "baumgarte")  # families of constraintDynamics with fixed steps
-FIXED = (*PROXIMAL, LCABA, *ANCHORED)
+IMPULSES, IMPULSES_PGS, COMPLIANT = "impulses", "impulses, pgs", "compliant"
+STEPPED = (IMPULSES, IMPULSES_PGS, COMPLIANT)
+FIXED = (*PROXIMAL, LCABA, *ANCHORED, *STEPPED)
 DOP853_COMPILED, TUNED_COMPILED = "dop853, compiled", "tuned, compiled"
 COMPILED = (DOP853_COMPILED, TUNED_COMPILED)
 COMPILED_RTOLS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
@@ -31,6 +33,10 @@ FAMILIES = {
     ADMM: "RK4 with the point and frame anchors of Pinocchio 4, solved by its ADMM, and Baumgarte terms, "
     "double root 0.1/step",
     PGS: "like admm, solved by its projected Gauss-Seidel",
+    IMPULSES: "steps of first order by impulses of ADMM on the anchors, as in Pinocchio's own examples; a "
+    "step removes the share kp of a closure's error",
+    IMPULSES_PGS: "like impulses, by its projected Gauss-Seidel",
+    COMPLIANT: "like impulses, closures with the compliance step² / mean mass, which vanishes with the step",
     "dop853": "DOP853 without stabilisation",
     "tuned": "DOP853, every accepted state projected onto the closures",
     DOP853_COMPILED: "like dop853, without Python: constraintDynamics of its C++ library called by a "
@@ -45,6 +51,9 @@ OPTIONS = {
     "rtol": "relative tolerance of a step",
     "min_step": "shortest step, s",
     "beta": "decay rate of the closure errors, a double root, 1/s",
+    "kp": "share of a closure's error that a step by impulses removes",
+    "compliance": "compliance of closures, m/N and rad/(N m)",
+    "damping": "damping of closures that have a compliance, N s/m and N m s/rad",
     "mu": "proximal parameter of the constraint solver",
     "iterations": "largest number of its iterations",
     "solver": "constraintDynamics, lcaba, or ADMM, PGS or least squares for the anchors of Pinocchio 4",
@@ -73,15 +82,24 @@ def sweep(scene: Scene, rate: float) -> list[Setting]:
 
     Settings are coarse to fine in each family.
     """
+    fine = ("baumgarte", *ANCHORED, *STEPPED)
     fixed = [
-        Setting(family, {"step": h})
+        Setting(family, {"step": h} | _feedback(scene, family, h))
         for family in FIXED
-        for h in turning(scene, rate, (*STEPS, FINEST) if family in ("baumgarte", *ANCHORED) else STEPS)
+        for h in turning(scene, rate, (*STEPS, FINEST) if family in fine else STEPS)
     ]
     least = float(f"{LEAST_TURN / rate:.2g}")
     adaptive = [{"rtol": r, "min_step": least} for r in RTOLS]
     compiled = [] if compiled_run.why_not(scene) else _compiled(least)
     return fixed + [Setting(family, o) for family in ("dop853", "tuned") for o in adaptive] + compiled
+
+
+def _feedback(scene: Scene, family: str, step: float) -> dict[str, float]:
+    """Return the options of a family of STEPPED at a step (s)."""
+    if family != COMPLIANT:
+        return {"kp": 1.0} if family in STEPPED else {}
+    mass = sum(body.mass or 0.0 for body in scene.body) / max(len(scene.body), 1)
+    return {"compliance": float(f"{step**2 / mass:.2g}"), "damping": 0.0} if mass else {"compliance": 0.0}
 
 
 def _compiled(least: float) -> list[Setting]:

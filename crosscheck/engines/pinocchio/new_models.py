@@ -3,12 +3,17 @@
 M a = M a₀ + Jᵀ f and J a + J̇ v = -2 β J v - β² Φ, with the Jacobian J, the bias J̇ v and the errors J v and
 Φ of the models, and the accelerations a₀ without closures. So G f + g = 0 with G = J M⁻¹ Jᵀ. Pinocchio's
 ADMM or PGS solves for f, or least squares here.
+
+As in Pinocchio's own examples, a step of length h can also be made by impulses h f, with the end velocities
+v + h a: J (v + h a) = -(Kp / h) Φ. Closures with the compliance C (m/N) and the damping d (N s/m) push with
+f = -(Φ + h J (v + h a)) / C - d J (v + h a), which is (G + R) f + g = 0 with R = C / (h² + C d h) and
+Kp = h / (h + C d).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,14 +33,41 @@ LEAST = "least squares"
 Solver = Callable[[np.ndarray, np.ndarray], np.ndarray | None]
 
 
+class Impulses(NamedTuple):
+    """Feedback of closure errors in steps by impulses: the share Kp of an error that a step removes, the
+    ``compliance`` C of closures (m/N), and their ``damping`` d (N s/m)."""
+
+    kp: float = 1.0
+    compliance: float = 0.0
+    damping: float = 0.0
+
+    def softness(self, step: float) -> float:
+        """Return R (1/kg) in a step of a length (s)."""
+        return self.compliance / (step**2 + self.compliance * self.damping * step)
+
+    def share(self, step: float) -> float:
+        """Return Kp in a step of a length (s)."""
+        return self.kp * step / (step + self.compliance * self.damping)
+
+
 class NewModels:
     """Point and frame anchors in the place of legacy closures; ``forces`` act in the first frames.
 
-    ``solver`` is ADMM, PGS or least squares, ``beta`` the decay rate of the closure errors (1/s).
+    ``solver`` is ADMM, PGS or least squares, ``beta`` the decay rate of the closure errors (1/s). With
+    ``impulses`` the accelerations belong to a step of length ``step`` (s).
     """
 
-    def __init__(self, pin: Any, model: Any, closures: Any, solver: str, beta: float = 0.0):
+    def __init__(
+        self,
+        pin: Any,
+        model: Any,
+        closures: Any,
+        solver: str,
+        beta: float = 0.0,
+        impulses: Impulses | None = None,
+    ):
         self.pin, self.model, self.beta = pin, model, beta
+        self.impulses, self.step = impulses, 0.0
         self.data, self.free = model.createData(), model.createData()
         self.models = pin.StdVec_ConstraintModel()
         for closure in closures:
@@ -79,14 +111,19 @@ class NewModels:
         self.pin.computeJointJacobians(self.model, self.data, q)
         self._calc()
         rows: np.ndarray = self.pin.getConstraintsJacobian(self.model, self.data, self.models, self.datas)
-        return rows.copy()
+        return rows.reshape(-1, self.model.nv).copy()  # Pinocchio gives a vector for one coordinate
 
     def _bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Return J̇ v + 2 β J v + β² Φ (rows,), from the errors that the models have without acceleration."""
+        """Return J̇ v + 2 β J v + β² Φ (rows,), from the errors that the models have without acceleration, or
+        (J v + Kp Φ / h) / h for impulses."""
         self.pin.forwardKinematics(self.model, self.data, q, v, 0 * v)
         self._calc()
         found = []
         for data in (data.extract() for data in self.datas):
+            if self.impulses:
+                gap = self.impulses.share(self.step) * data.constraint_position_error / self.step
+                found.append((data.constraint_velocity_error + gap) / self.step)
+                continue
             feedback = 2 * self.beta * data.constraint_velocity_error
             feedback = feedback + self.beta**2 * data.constraint_position_error
             found.append(data.constraint_acceleration_error + feedback)
@@ -108,6 +145,8 @@ class NewModels:
         def solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray | None:
             result = getattr(self.pin, f"{name}SolverResult")()
             delassus = self.pin.DelassusOperatorDense(matrix)
+            if self.impulses and self.impulses.compliance:
+                delassus.updateCompliance(np.full(len(right), self.impulses.softness(self.step)))
             solver.solve(delassus, right, self.models, self.datas, settings, result)
             return result.retrieveConstraintImpulses().copy() if result.converged else None
 

@@ -17,15 +17,17 @@ from crosscheck.engines.pinocchio.families import (
     CHOSEN,
     CONVERGED,
     FIXED,
+    IMPULSES_PGS,
     LCABA,
+    STEPPED,
     TUNED_COMPILED,
     TYPICAL_MU,
 )
 from crosscheck.engines.pinocchio.model import Loads, Mechanism
-from crosscheck.engines.pinocchio.new_models import NewModels
+from crosscheck.engines.pinocchio.new_models import Impulses, NewModels
 from crosscheck.engines.shared.driver_motion import motion, stated_rate
 from crosscheck.engines.shared.least_change import least_change, root_of_mass
-from crosscheck.engines.shared.sampling import Adaptive, Counts, Failed, Sample, rk4
+from crosscheck.engines.shared.sampling import Adaptive, Counts, Failed, Sample, rk4, step_count
 from crosscheck.engines.shared.tree_reactions import LinkMotion, sample_of
 from crosscheck.judge.constraints import scene_length
 from crosscheck.setting import unknown_family
@@ -97,8 +99,14 @@ class Simulation:
             self.solver = self.sampler = solver
             if options["solver"] not in ("constraintDynamics", LCABA):
                 self.new = NewModels(pin, self.model, self.closures, options["solver"])
-        if family in (*FIXED, CHOSEN):
-            self.step: Step = partial(self._rk4, setting.options["step"])
+        if family in STEPPED:
+            feedback = Impulses(*(options.get(name, d) for name, d in Impulses._field_defaults.items()))
+            solver = "PGS" if family == IMPULSES_PGS else "ADMM"
+            self.new = NewModels(pin, self.model, self.closures, solver, 0.0, feedback)
+            self.new.step = options["step"]
+            self.step: Step = partial(self._by_impulses, options["step"])
+        elif family in (*FIXED, CHOSEN):
+            self.step = partial(self._rk4, setting.options["step"])
         elif family in ("dop853", "tuned"):
             settle = self.projected if family == "tuned" else None
             limits = (setting.options["min_step"], self._max_step())
@@ -123,6 +131,20 @@ class Simulation:
 
     def _rk4(self, step: float, y: np.ndarray, t0: float, t1: float) -> np.ndarray:
         return rk4(self.rhs, self.on_spheres, y, t0, t1, step, self.counts)
+
+    def _by_impulses(self, step: float, y: np.ndarray, t0: float, t1: float) -> np.ndarray:
+        """Return the state at t1 by steps of equal lengths, of whose accelerations the impulses are part."""
+        assert self.new is not None
+        count = step_count(t0, t1, step)
+        h = self.new.step = (t1 - t0) / count
+        for i in range(count):
+            t = t0 + i * h
+            q, v = self.split(t, y)
+            v = v + h * self._finite(t, self.accelerations(t, q, v, self.solver))
+            y = self.on_spheres(t + h, np.concatenate((self.pin.integrate(self.model, q, h * v), v)))
+            self.counts.steps += 1
+            self.counts.rhs += 1
+        return y
 
     def advance(self, t0: float, t1: float) -> None:
         """Move the state from t0 to t1; raises Failed."""
@@ -204,6 +226,7 @@ class Simulation:
             point = closure.type == pin.ContactType.CONTACT_3D
             residual.append(data.c1Mc2.translation if point else pin.log6(data.c1Mc2).vector)
         jacobian = pin.getConstraintsJacobian(self.model, self.data, self.closures, self.closure_data)
+        jacobian = jacobian.reshape(-1, self.model.nv)  # Pinocchio gives a vector for one coordinate
         moves = np.abs(jacobian).max(axis=1, keepdims=True) > self.least
         return np.concatenate(residual), np.where(moves, jacobian, 0.0)
 
