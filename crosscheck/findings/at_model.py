@@ -69,6 +69,10 @@ def _meets(scene: Scene, one: Finding, when: When) -> bool:
     types = {joint.type for joint in scene.joint}
     if len(spanning_tree(scene).closures) < when.loops or (when.joints and not types & set(when.joints)):
         return False
+    if when.polynomial and all(coupling.powers == 1 for coupling in scene.coupling):
+        return False
+    if any(math.hypot(*body.position) < when.away for body in scene.body):
+        return False
     return not when.versions or engine(one.engine).version() in when.versions
 
 
@@ -106,10 +110,19 @@ def _pair(scene: Scene, one: Finding, when: When, setting: Setting) -> Tried | N
         return None
     first, second = (in_scene_order(scene, run) for run in runs)
     found = starts(scene, first, second)
+    if mended == setting:
+        return _alone(when, setting, found)
     apart, (wrong, right) = found or _poses(scene, first, second)
     what = ("accelerations at the start", "of the largest") if found else ("poses", "rad or lengths")
     words = f"{what[0]} are off by {wrong:.2g} {what[1]}, otherwise by {right:.2g}"
     return Tried(setting, apart, words) if apart > when.above and right <= BETTER * wrong else None
+
+
+def _alone(when: When, setting: Setting, found: Starts | None) -> Tried | None:
+    """Return the error of accelerations at the start, where the engine has no remedy."""
+    error = math.nan if found is None else found.errors[0]
+    words = f"accelerations at the start are off by {error:.2g} of the largest"
+    return Tried(setting, error, words) if error > when.above else None
 
 
 def _drifting(

@@ -26,11 +26,14 @@ class Starts(NamedTuple):
 
 
 def starts(scene: Scene, first: Trajectory, second: Trajectory) -> Starts | None:
-    """Return the difference of two runs that begin at t = 0; None if one of them has no accelerations."""
+    """Return the difference of two runs that begin at t = 0; None if one of them has no accelerations, or if
+    nothing accelerates the scene."""
     found = [_of_run(scene, in_scene_order(scene, run)) for run in (first, second)]
     if found[0] is None or found[1] is None:
         return None
     least, apart = REST * acceleration_scale(scene), _size(found[1] - found[0])
+    if not least:
+        return None
     if not scene.has_mass():
         return Starts(apart / max(*map(_size, found), least), (math.nan, math.nan))
     exact = gauss(scene)

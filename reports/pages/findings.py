@@ -52,6 +52,8 @@ def _tried(found: Finding, when: When) -> str:
     parts = [f"version {' or '.join(when.versions)}"] if when.versions else []
     parts += [f"mechanisms of at least {when.loops} loop{'s' * (when.loops > 1)}"] if when.loops else []
     parts += [f"a joint of the type {', '.join(when.joints)}"] if when.joints else []
+    parts += ["a coupling by a polynomial"] if when.polynomial else []
+    parts += [f"bodies at least {when.away:g} m from the origin"] if when.away else []
     parts += [f"{name} {value}" for name, value in when.settings.items()]
     parts += [f"motions that keep the {when.keeps}"] if when.keeps else []
     command = f"`crosscheck diagnose SCENE --engine {found.engine}`"

@@ -10,6 +10,7 @@ import pytest
 
 import crosscheck.findings
 from crosscheck.cli.commands import main
+from crosscheck.conformance.mechanisms.invariant import moved_away
 from crosscheck.engine import Setting, engine, installed
 from crosscheck.findings.at_model import defects
 from crosscheck.findings.finding import Finding, When, findings
@@ -120,6 +121,30 @@ CRANK = """<mujoco model="crank">
   </equality>
   <keyframe><key qpos="0 0 0" qvel="30 -52.5 0"/></keyframe>
 </mujoco>"""
+CAM = """<mujoco model="cam">
+  <option gravity="0 0 0"/>
+  <worldbody>
+    <body name="cam"><joint name="cam" type="slide"/>
+      <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>
+    <body name="follower"><joint name="follower" type="slide" axis="0 1 0"/>
+      <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>
+  </worldbody>
+  <equality><joint joint1="follower" joint2="cam" polycoef="0 0 1 0 0"/></equality>
+  <keyframe><key qpos="0 0" qvel="{} 0"/></keyframe>
+</mujoco>"""
+LARGE = """<mujoco model="large">
+  <option timestep="{2}" integrator="RK4" solver="CG"/>
+  <worldbody>
+    <body name="a"><joint name="A" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 {0}" size="{1}"/>
+      <body name="b" pos="0 0 {0}"><joint name="B" axis="0 1 0"/>
+        <geom type="capsule" fromto="0 0 0 {0} 0 {1}" size="{1}"/></body></body>
+    <body name="c" pos="{0} 0 0"><joint name="D" axis="0 1 0"/>
+      <geom type="capsule" fromto="0 0 0 0 0 {0}" size="{1}"/></body>
+  </worldbody>
+  <default><geom contype="0" conaffinity="0"/></default>
+  <equality><connect body1="c" body2="b" anchor="0 0 {0}" solref="{3} 1" solimp="0.9999 0.9999"/></equality>
+  <keyframe><key qpos="0.5 -0.5 0.5"/></keyframe>
+</mujoco>"""
 
 
 # a mechanism that meets the conditions of a finding and has it, and one that meets them without having it
@@ -128,6 +153,9 @@ MODELS: dict[str, tuple[Scene | Path | str, Scene | str]] = {
     "mujoco-sparse-jacobian-of-loops": (CHAINS, four_bar()),
     "mujoco-connect-angular-momentum": (PAIR.format(spin=20, other=5), PAIR.format(spin=0, other=-5)),
     "mujoco-implicit-feeds-energy": (CRANK.format(integrator="implicit"), CRANK.format(integrator="RK4")),
+    "mujoco-polynomial-joint-equality": (CAM.format(1), CAM.format(0)),
+    "mujoco-cg-depends-on-size": (LARGE.format(1000, 10, 0.01, 0.02), LARGE.format(1, 0.01, 1e-3, 2e-3)),
+    "pinocchio-lcaba-distance": (moved_away(four_bar(), 100.0), four_bar()),
     "pinocchio-lcaba-typical-mu": (three_links(), four_bar()),
     "pinocchio-pgs-converged-too-early": (welded(), three_links()),
 }
