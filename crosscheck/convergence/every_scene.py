@@ -20,8 +20,8 @@ LEVEL = 1e-6  # lengths or rad
 TIME_LIMIT = 0.5  # s of CPU time of a run, so that all runs take a quarter of an hour
 LONGEST = 0.5  # s of a motion
 FAMILIES = {
-    "mujoco": ("stock", "euler", "discrete"),
-    "pinocchio": ("baumgarte", "lcaba", "admm", "pgs"),
+    "mujoco": ("stock", "euler", "implicit", "implicitfast", "discrete"),
+    "pinocchio": ("baumgarte", "lcaba", "admm", "pgs", "impulses"),
 }
 ROWS = tuple(
     row._replace(time_limit=TIME_LIMIT) for row in ladders.ROWS if row.family in FAMILIES.get(row.engine, ())
