@@ -28,7 +28,11 @@ DEFAULT_STEPS = {solvers.DEFAULTS: 1e-3}
 
 
 class Newton(SteppingEngine):
-    """Newton (PyPI ``newton``)."""
+    """Newton (PyPI ``newton``).
+
+    It declares no ``alternatives``: a first step of Kamino gains 0.2 % to 111 % of acceleration times
+    step, by solver and integrator, and later steps the right amount.
+    """
 
     name = "newton"
     package = "newton"
