@@ -30,6 +30,7 @@ from mbref.scene.units import number_in
 from mbref.scene.validation import checked_inertia
 
 OF_POINT = ("name", "body", "point", "along")  # fields of a driver of a point
+ALONG_JOINT = ("name", "along")  # those that a driver of a displacement of a joint has, too
 DRIVER = "driver({})"  # name of the driver of a joint in columns and records
 UNIT_TOLERANCE = 1e-6  # largest deviation of a quaternion from unit length that counts as rounding
 START_ROUNDING = 1e-12  # value of a driver at t = 0 / its largest term, or 1 m or rad, that is rounding
@@ -95,10 +96,12 @@ def _in_si(value: Any) -> Any:
 class Driver(TimeFunction):
     """Prescribed motion of the second body of ``joint`` relative to the first, from t = 0.
 
-    value(t) = c0 + c1 t + c2 t² + … + sine + table: the angle of a revolute or cylindrical joint about its
-    axis (rad), or the displacement of a translational or free one along it (m).  value(0) must be zero.
+    value(t) = c0 + c1 t + c2 t² + … + sine + table: the angle of a revolute, cylindrical or planar joint
+    about its axis (rad), or the displacement of a translational or free one along it (m).  value(0) must be
+    zero.  With a ``name`` and a direction ``along`` (world at t = 0, carried by the first body) in which the
+    joint lets the bodies move, it is the displacement along this direction.
     In place of a joint, a ``name``, a ``body``, its ``point`` (world at t = 0) and a world direction
-    ``along`` prescribe the displacement of a point; a read scene has a free joint in their place.
+    ``along`` prescribe the displacement of a point; a read scene has a free joint in place of a direction.
     """
 
     name: Name | None = None
@@ -118,9 +121,11 @@ class Driver(TimeFunction):
     def _joint_or_point(cls, joint: Any, info: ValidationInfo) -> Any:
         """Return the name of the joint, or of the driven point; a faulty field counts as given."""
         given = [field for field in OF_POINT if info.data.get(field, field) is not None]
-        missing = [field for field in OF_POINT if field not in given]
-        if joint and given:
+        missing = [field for field in (ALONG_JOINT if joint else OF_POINT) if field not in given]
+        if joint and set(given) - {*ALONG_JOINT}:
             raise ValueError(f"or a driven point, not both; got {given[0]}, too")
+        if joint and given and missing:
+            raise ValueError(f"with {given[0]} needs {missing[0]}, too, for a displacement of the joint")
         if joint or not missing:
             return joint or info.data.get("name")
         raise ValueError("is required" + f", or {', '.join(missing)} of the driven point" * bool(given))

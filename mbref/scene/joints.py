@@ -134,7 +134,7 @@ class Cylindrical(_TurningJoint):
 class Planar(AxisJoint):
     """Displacement in the plane through ``anchor`` with normal ``axis``, and rotation about the normal."""
 
-    facts = JointFacts(forbidden_translations=(Z,), forbidden_rotations=(X, Y))
+    facts = JointFacts((Z,), (X, Y), driven="angle")
     type: Literal["planar"] = "planar"
 
 

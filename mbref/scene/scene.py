@@ -47,7 +47,7 @@ class Scene(SceneEntry):
     coupling : tuple of Coupling
         Linear relations of joint coordinates.
     driver : tuple of Driver
-        Prescribed motions of joints; of a point, as motion of a joint of type free.
+        Prescribed motions of joints; of a point, or in a plane, as motions of joints of type free.
     load : tuple of Load
         Forces, moments, springs and dampers.
     """
@@ -82,15 +82,20 @@ class Scene(SceneEntry):
         return scene
 
     def _with_free_joints(self) -> dict[str, Any]:
-        """Return the fields in which driven points have free joints."""
-        points = [driver for driver in self.driver if driver.point is not None]
-        free = [
-            Free(name=each.joint, bodies=(GROUND, each.body), anchor=each.point, axis=each.along)
-            for each in points
-        ]
-        no_point = dict.fromkeys(OF_POINT)
-        driver = tuple(each.model_copy(update=no_point) if each in points else each for each in self.driver)
-        return {"joint": (*self.joint, *free), "driver": driver} if points else {}
+        """Return the fields in which driven points, and driven directions of joints, have free joints."""
+        if all(driver.along is None for driver in self.driver):
+            return {}
+        joints, drivers = [*self.joint], []
+        for driver in self.driver:
+            if driver.along is not None:
+                bodies, anchor = (GROUND, driver.body), driver.point
+                if driver.point is None:
+                    joint = self.joint_named(driver.joint)
+                    bodies, (anchor, _) = joint.bodies, joint.anchor_pair
+                joints.append(Free(name=driver.name, bodies=bodies, anchor=anchor, axis=driver.along))
+            of_joint = {**dict.fromkeys(OF_POINT), "joint": driver.name or driver.joint}
+            drivers.append(driver.model_copy(update=of_joint))
+        return {"joint": tuple(joints), "driver": tuple(drivers)}
 
     def _repeated(self, until: float) -> dict[str, Any]:
         """Return the fields in which periodic tables are too short for a time (s), with more periods."""

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from mbref.printable import printable
 from mbref.scene.body_faults import mass_faults
 from mbref.scene.coupling_faults import coordinate_faults, count_faults
+from mbref.scene.driver_faults import MOVED_ALONG, direction_faults
 from mbref.scene.fields import checked_length, checked_size, field_of, meant, shown
 from mbref.scene.function_faults import Faults, factor_faults, listed, table_faults, unit_faults
 from mbref.scene.interval_faults import condition_faults, interval_faults
@@ -156,7 +157,7 @@ def named_paths(data: Mapping[str, Any], faults: Mapping[str, str]) -> Iterator[
 def _own_name(data: Mapping[str, Any], key: str, place: int) -> str:
     """Return the name of an entry if no other entry has it and a path can contain it; otherwise an empty
     text."""
-    fields = ("joint", "name") if key == "driver" else ("name",)
+    fields = ("name", "joint") if key == "driver" else ("name",)
     names = [next(filter(None, (_text(entry, f) for f in fields)), "") for entry in _entries(data, key)]
     name = names[place] if place < len(names) else ""
     fits_a_path = not name.isdigit() and not set(name) & set("[]") and len(name) < 80 and name.isprintable()
@@ -204,6 +205,13 @@ def reference_faults(data: Mapping[str, Any]) -> Faults:
         yield from _pair_faults(f"joint[{i}].bodies", field_of(joint, "bodies"), known)
     types = {_text(joint, "name"): _text(joint, "type") for joint in joints}
     yield from _point_faults(data, types, known)
+    driven = {_text(joint, "name"): joint for joint in joints}
+    for i, driver in enumerate(_entries(data, "driver")):
+        if field_of(driver, "along") is not None and (name := _text(driver, "joint")):
+            yield from _joint_faults(
+                f"driver[{i}].joint", name, types, MOVED_ALONG, "be driven along a direction"
+            )
+            yield from direction_faults(f"driver[{i}].along", driver, driven.get(name))
     types |= {_text(driver, "name"): "free" for driver in _entries(data, "driver") if _text(driver, "name")}
     yield from _coupling_faults(data, types)
     yield from _driver_faults(data, types)
@@ -278,7 +286,7 @@ def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
     """Yield drivers of unknown or wrong joints, and second drivers of a joint."""
     driven: set[str] = set()
     for i, driver in enumerate(_entries(data, "driver")):
-        field = "joint" if _text(driver, "joint") else "name"
+        field = "name" if _text(driver, "name") else "joint"
         name = field_of(driver, field)
         yield from _joint_faults(f"driver[{i}].{field}", name, types, DRIVABLE, "be driven")
         if isinstance(name, str):

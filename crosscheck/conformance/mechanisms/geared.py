@@ -24,7 +24,7 @@ def geared_mechanism(seed: int) -> Scene:
     scene, rng = random_mechanism(seed), np.random.default_rng([seed, 1])
     joints = [
         joint.model_copy(update={"armature": float(rng.uniform(0.02, 0.5))})
-        if joint.facts.driven and rng.random() < GEARED
+        if "armature" in type(joint).model_fields and rng.random() < GEARED
         else joint
         for joint in scene.joint
     ]

@@ -245,7 +245,8 @@ class _Reader:
 
     def _with_armature(self, chain: Chain, joints: list[Joint]) -> list[Joint]:
         """Return the joints of a chain; the joint of a single hinge or slide has its armature."""
-        driven = joints[0].facts.driven if len(joints) == 1 else None
+        has_armature = len(joints) == 1 and "armature" in type(joints[0]).model_fields
+        driven = joints[0].facts.driven if has_armature else None
         wanted = {"hinge": ANGLE, "slide": DISPLACEMENT}
         kinds = [wanted.get(kind) for kind in chain.kinds]
         own = [j for j, kind in zip(chain.joints, kinds, strict=True) if driven and kind == driven]
@@ -297,9 +298,10 @@ class _Reader:
     def _coordinate(self, row: JointRow, j: int) -> tuple[Joint, Coordinate] | None:
         """Return the scene's joint of a hinge or slide in the file, and its coordinate; None without one."""
         joint, couples = self.joint_of.get(j), len(row.joints) > 1
-        if joint is None or not joint.facts.driven or (joint.type == "cylindrical" and not couples):
+        if joint is None or (joint.type == "cylindrical" and not couples):
             return None
-        return joint, ANGLE if kind_of(self.mujoco, self.model, j) == "hinge" else DISPLACEMENT
+        coordinate = ANGLE if kind_of(self.mujoco, self.model, j) == "hinge" else DISPLACEMENT
+        return (joint, coordinate) if coordinate in joint.facts.coordinates else None
 
     def _read_loads(self) -> None:
         mujoco, model, data = self.mujoco, self.model, self.poses.data
