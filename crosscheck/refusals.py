@@ -15,6 +15,7 @@ from mbref.scene import Scene, intermittent
 
 MOST_COUPLED = 2  # coordinates of a coupling of adapters that do not declare sums
 LONGEST_TEXT = 1000  # characters of an engine's message that are kept: about ten lines of a terminal
+ORIENTATION = "orientation"  # of a ball joint, which a driver can prescribe
 TABLE, FACTOR = "table", "factor"  # features of a driver and of a load
 
 
@@ -69,7 +70,8 @@ class Supports:
     joints : collection of str
         Joint types, as in scene files.
     drivers, couplings, armatures : collection of str
-        Joint coordinates that can be driven, coupled or have an armature: ``"angle"``, ``"displacement"``.
+        Joint coordinates that can be driven, coupled or have an armature: ``"angle"``, ``"displacement"``; a
+        driver can also prescribe the ``"orientation"`` of a ball joint.
     loads : collection of str
         Load types, as in scene files.
     over_time : collection of str
@@ -129,10 +131,10 @@ class Supports:
                 yield f"joint {joint.name!r} has an armature"
         yield from self._missing_of_couplings(scene)
         for driver in scene.driver:
-            coordinate = scene.joint_named(driver.joint).facts.driven
+            coordinate = scene.joint_named(driver.joint).facts.driven or ORIENTATION
             if coordinate not in self.drivers:
                 yield f"the driver of joint {driver.joint!r} prescribes its {coordinate}"
-            if driver.table and TABLE not in self.over_time:
+            if any(function.table for function in driver.functions) and TABLE not in self.over_time:
                 yield f"the driver of joint {driver.joint!r} follows a table"
         for k, load in enumerate(scene.load):
             if load.type not in self.loads:

@@ -11,7 +11,7 @@ import numpy as np
 from crosscheck.differentiating import Differentiating, TangentDerivatives
 from crosscheck.engine import Alternatives, Cannot, Engine, Owner, Setting, Supports
 from crosscheck.judge.tolerances import ROUNDING
-from crosscheck.refusals import FACTOR, TABLE
+from crosscheck.refusals import FACTOR, ORIENTATION, TABLE
 from crosscheck.setting import BRANCHES, FamilyParts
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import JOINT_TYPES, LOAD_TYPES, Scene, intermittent
@@ -78,7 +78,7 @@ class Mbref(Differentiating, Engine):
     differentiates_by = DIFFERENTIATES_BY
     supports = Supports(
         joints=tuple(JOINT_TYPES),
-        drivers=get_args(Coordinate),
+        drivers=(*get_args(Coordinate), ORIENTATION),
         loads=tuple(LOAD_TYPES),
         couplings=get_args(Coordinate),
         armatures=get_args(Coordinate),

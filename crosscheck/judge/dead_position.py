@@ -12,7 +12,7 @@ import numpy as np
 
 from crosscheck.judge.constraints import closure, jacobian, joint_coordinates, length_rows, scene_length
 from crosscheck.judge.coupling_laws import law_value
-from crosscheck.judge.joint_residuals import wrapped
+from crosscheck.judge.driver_rows import wrapped
 from mbref import rotations
 from mbref.scene import Scene
 from mbref.scene.joints import DISPLACEMENT

@@ -13,8 +13,10 @@ from crosscheck.judge.constraints import jacobian, length_rows
 from crosscheck.judge.coupling_laws import unwound
 from crosscheck.judge.deadline import ask
 from crosscheck.judge.joint_reactions import unit_rows
+from crosscheck.judge.joint_residuals import in_world, joint_frames, with_ground
 from crosscheck.judge.reaction_balance import demanded, forces_of_armatures
 from crosscheck.judge.tolerances import RANK
+from mbref import rotations
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 
@@ -23,7 +25,8 @@ DETERMINED = 1 - 1e-6
 
 
 def driver_forces(scene: Scene, exact: Trajectory) -> dict[str, np.ndarray]:
-    """Return the force (N) or torque (N m) (k,) of each driver, by its joint.
+    """Return the force (N) or torque (N m) (k,) of each driver, by its joint; of a driven orientation the
+    moment (k, 3), N m, world axes.
 
     The torque accelerates the armature of the joint too, and contains what couplings transmit. It is NaN at
     samples at which redundant constraints do not determine it, or full turns of a coupling cannot be counted.
@@ -32,11 +35,19 @@ def driver_forces(scene: Scene, exact: Trajectory) -> dict[str, np.ndarray]:
     """
     rows_of = {name: len(mask) for name, mask in length_rows(scene).items()}
     ends = dict(zip(rows_of, np.cumsum(list(rows_of.values())), strict=True))
-    last = [int(ends[driver.joint]) - 1 for driver in scene.driver]
+    last = [int(ends[driver.joint]) - k for driver in scene.driver for k in range(driver.rows, 0, -1)]
     wanted = demanded(scene, exact).reshape(len(exact.times), -1)
     scenes = unwound(scene, exact)
     found = np.array([_multipliers(scenes[k], exact, k, push)[last] for k, push in enumerate(wanted)])
-    return {driver.joint: found[:, i] for i, driver in enumerate(scene.driver)}
+    parts = np.split(found, np.cumsum([driver.rows for driver in scene.driver])[:-1], axis=1)
+    frames = {joint.name: joint for joint in joint_frames(scene)}
+    pose = with_ground(exact.position, exact.orientation)
+    return {
+        driver.joint: rotations.rotate(in_world(frames[driver.joint], *pose)[2][0], part)
+        if driver.turn
+        else part[:, 0]
+        for driver, part in zip(scene.driver, parts, strict=True)
+    }
 
 
 def _multipliers(scene: Scene, exact: Trajectory, k: int, push: np.ndarray) -> np.ndarray:

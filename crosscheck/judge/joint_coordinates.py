@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from crosscheck.judge.driver_rows import twist, wrapped
 from crosscheck.judge.joint_residuals import (
     JointFrames,
     anchor_acceleration,
@@ -22,9 +23,7 @@ from crosscheck.judge.joint_residuals import (
     relative_acceleration,
     relative_twist,
     resolve,
-    twist,
     with_ground,
-    wrapped,
 )
 from mbref import rotations
 from mbref.scene import Scene

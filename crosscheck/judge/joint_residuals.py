@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.judge import time_functions, wheels
+from crosscheck.judge import driver_rows, wheels
 from mbref import rotations
 from mbref.rotations import cross
 from mbref.scene import GROUND, Driver, Joint, JointFacts, RollingWheel, Scene, refuse_intervals
@@ -63,6 +63,8 @@ def joint_frames(scene: Scene) -> tuple[JointFrames, ...]:
 def _packed(scene: Scene, joint: Joint, driver: Driver | None) -> JointFrames:
     anchors = np.array(joint.anchor_pair)
     frames = np.array([_frame(axis) for axis in _third_axes(joint)])
+    if driver and driver.turn:
+        frames[:] = 1.0, 0.0, 0.0, 0.0  # turns are about axes of the world at t = 0
     if isinstance(joint, RollingWheel):
         frames[0] = _frame(joint.normal, joint.without_slip[0])
     points = anchors.copy()
@@ -98,7 +100,7 @@ def are_lengths(joint: JointFrames) -> np.ndarray:
     if joint.keeps_distance or joint.facts.velocity_rows:
         return np.ones(facts.rows, dtype=bool)
     angles = len(facts.forbidden_rotations) + joint.keeps_axes_perpendicular
-    driver = [joint.slides] if joint.driver else []
+    driver = [joint.slides] * (joint.driver.rows if joint.driver else 0)
     return np.array([True] * len(facts.forbidden_translations) + [False] * angles + driver)
 
 
@@ -121,8 +123,7 @@ def position_rows(
     elif joint.facts.forbidden_rotations:
         rows.append(_tilt(relative) if joint.facts.free_rotations else _rotation_vector(relative))
     if joint.driver:
-        value = time_functions.value(joint.driver, t)
-        rows.append((local[..., 2] - value if joint.slides else wrapped(twist(relative) - value))[..., None])
+        rows.append(driver_rows.residual(joint.driver, joint.slides, t, local, relative))
     return np.concatenate(rows, axis=-1)
 
 
@@ -199,11 +200,6 @@ def _axis(frames: list[np.ndarray]) -> np.ndarray:
     return resolve(frames[0], rotations.rotate(frames[1], Z))
 
 
-def wrapped(angle: np.ndarray) -> np.ndarray:
-    """Return angles (…) shifted by full turns into [-π, π]."""
-    return angle - 2 * np.pi * np.round(angle / (2 * np.pi))
-
-
 def in_world(
     joint: JointFrames, position: np.ndarray, orientation: np.ndarray
 ) -> tuple[list[np.ndarray], np.ndarray, list[np.ndarray]]:
@@ -254,8 +250,7 @@ def _rows(
     rows = [linear[..., list(facts.forbidden_translations)], angular[..., list(facts.forbidden_rotations)]]
     rows += crossing
     if joint.driver:
-        moved = (linear if joint.slides else angular)[..., 2:]
-        rows.append(moved - time_functions.value(joint.driver, t, derivative)[..., None])
+        rows.append(driver_rows.rate(joint.driver, joint.slides, t, derivative, (linear, angular)))
     return np.concatenate(rows, axis=-1)
 
 
@@ -306,11 +301,6 @@ def _tilt(q: np.ndarray) -> np.ndarray:
     # any direction if the axes are opposite
     unit = np.stack([np.where(sine > 0, -y / size, 1.0), x / size], axis=-1)
     return unit * np.arctan2(sine, z)[..., None]
-
-
-def twist(q: np.ndarray) -> np.ndarray:
-    """Return the angle about the third axis, up to full turns."""
-    return 2 * np.arctan2(q[..., 3], q[..., 0])
 
 
 def with_ground(position: np.ndarray, orientation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

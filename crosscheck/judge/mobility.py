@@ -30,5 +30,5 @@ def mobility(scene: Scene) -> Mobility:
 
 def row_count(scene: Scene) -> int:
     """Return the number of rows of joints, drivers and couplings."""
-    driven = sum(1 for _ in scene.driver)
+    driven = sum(driver.rows for driver in scene.driver)
     return sum(joint.facts.rows for joint in scene.joint) + driven + len(scene.coupling)

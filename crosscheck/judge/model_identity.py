@@ -137,7 +137,10 @@ def acceleration_scale(scene: Scene) -> float:
     for driver in scene.driver:
         of_length = 1.0 if scene.joint_named(driver.joint).facts.driven == "displacement" else length
         times = np.linspace(0.0, scene.duration, DRIVEN_SAMPLES)
-        rate, change = (of_length * np.abs(value(driver, times, k)).max() for k in (1, 2))
+        rate, change = (
+            of_length * sum(np.abs(value(function, times, k)).max() for function in driver.functions)
+            for k in (1, 2)
+        )
         parts += [float(change), float(rate) ** 2 / length]
     if mass > 0:
         parts += [_force(load, length, speed) * _most(scene, load) / mass for load in scene.load]

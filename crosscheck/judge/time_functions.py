@@ -35,7 +35,8 @@ def ends(function: TimeFunction) -> tuple[float, ...]:
 
 def functions_of(scene: Scene) -> list[TimeFunction]:
     """Return the functions of time of a scene's drivers and loads."""
-    return [*scene.driver, *(load.over_time for load in scene.load if load.over_time)]
+    of_drivers = [function for driver in scene.driver for function in driver.functions]
+    return [*of_drivers, *(load.over_time for load in scene.load if load.over_time)]
 
 
 def next_end(scene: Scene, since: float) -> float:

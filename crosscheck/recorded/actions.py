@@ -28,6 +28,7 @@ from mbref.scene.joints import ANGLE
 ENERGIES = ("kinetic_energy", "potential_energy", "energy")
 SPRING = ("length", "length_rate", "force", "power", "energy")
 TURNING = ("angle", "rate", "torque", "power")
+MOMENTS = ("moment.x", "moment.y", "moment.z")  # of a driven orientation
 SLIDING = ("displacement", "displacement_rate", "force", "power")
 
 
@@ -39,7 +40,8 @@ def action_names(scene: Scene) -> list[str]:
     if scene.has_mass():
         for driver in scene.driver:
             slides = scene.joint_named(driver.joint).facts.driven != ANGLE
-            found += [f"driver({driver.joint}).{kind}" for kind in ("force" if slides else "torque", "power")]
+            kinds = MOMENTS if driver.turn else ("force",) if slides else ("torque",)
+            found += [f"driver({driver.joint}).{kind}" for kind in (*kinds, "power")]
         found += ENERGIES
     return found
 
@@ -94,11 +96,8 @@ def _power(
 ) -> np.ndarray:
     """Return the power (k,) of a force or a moment on a body, or of a damper between bodies, W."""
     if isinstance(load, RotationalDamper | PointDamper):
-        first, second = (scene.body_index(name) for name in load.bodies)
-        spins = [
-            np.zeros((len(motion.times), 3)) if b < 0 else motion.angular_velocity[:, b]
-            for b in (first, second)
-        ]
+        first = scene.body_index(load.bodies[0])
+        spins = [_spin(scene, name, motion) for name in load.bodies]
         if isinstance(load, RotationalDamper):
             rate = spins[1] - spins[0]
         else:
@@ -112,6 +111,12 @@ def _power(
     else:
         rate, action = motion.angular_velocity[:, scene.body_index(load.body)], load.moment
     return np.asarray(_factor(load, motion.times) * (rate @ np.array(action)))
+
+
+def _spin(scene: Scene, name: str, motion: Trajectory) -> np.ndarray:
+    """Return the angular velocity (k, 3) of a body or of the ground."""
+    body = scene.body_index(name)
+    return np.zeros((len(motion.times), 3)) if body < 0 else motion.angular_velocity[:, body]
 
 
 def _of_spring(scene: Scene, load: Spring, motion: Trajectory) -> tuple[np.ndarray, ...]:
@@ -154,6 +159,11 @@ def _drivers(
     scene: Scene, motion: Trajectory, moved: Mapping[str, np.ndarray]
 ) -> Iterator[tuple[str, np.ndarray]]:
     for joint, push in driver_forces(scene, motion).items() if scene.driver else ():
+        if push.ndim > 1:
+            yield from zip((f"driver({joint}).{kind}" for kind in MOMENTS), push.T, strict=True)
+            first, second = (_spin(scene, name, motion) for name in scene.joint_named(joint).bodies)
+            yield f"driver({joint}).power", np.sum(push * (second - first), axis=1)
+            continue
         slides = scene.joint_named(joint).facts.driven != ANGLE
         yield f"driver({joint}).{'force' if slides else 'torque'}", push
         yield f"driver({joint}).power", push * moved[f"{joint}.{'displacement_rate' if slides else 'rate'}"]

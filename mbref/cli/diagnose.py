@@ -210,10 +210,9 @@ def _driver_lines(scene: Scene) -> list[str]:
 
     conflict = conflict_of_drivers(assembled(scene))
     freedoms = counts(scene.with_(driver=(), load=())).degrees_of_freedom
-    sentence = (
-        f"  more drivers than degrees of freedom ({len(scene.driver)} and {freedoms}): redundant rows remain"
-    )
-    lines = [sentence] * (len(scene.driver) > freedoms)
+    driven = sum(driver.rows for driver in scene.driver)
+    sentence = f"  more drivers than degrees of freedom ({driven} and {freedoms}): redundant rows remain"
+    lines = [sentence] * (driven > freedoms)
     return [*lines, *([f"  {conflict.sentence}"] if conflict else [])]
 
 

@@ -28,7 +28,7 @@ from mbref.equations.placed import placed_with_springs
 from mbref.input_error import InputError
 from mbref.motions.constraints import without_armatures
 from mbref.motions.motion import Motion
-from mbref.scene import Scene, SceneError, refuse_rolling
+from mbref.scene import Scene, SceneError, refuse_rolling, refuse_turned
 from mbref.scenes import find_scene
 
 STARTS = 24  # number of poses from which an equilibrium is searched
@@ -141,6 +141,7 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
     """
     scene = assembled(find_scene(scene))
     refuse_rolling(scene, "equilibria and their modes")
+    refuse_turned(scene, "equilibria and their modes")
     refuse_conflict(scene)
     frame = _frame(scene)
     model = Model(frame.with_armature(scene, 0.0))

@@ -161,6 +161,8 @@ def _admissible_types(scene: Scene, name: str) -> list[str]:
     """Return the joint types that can have the driver, the armature, the loads and the couplings of the joint
     of that name."""
     joint = scene.joint_named(name)
+    if any(driver.joint == name and driver.turn for driver in scene.driver):
+        return [joint.type]
     couplings = [c for c in scene.coupling if name in c.joints]
     coupled = {coordinate for c in couplings for end, coordinate in scene.coupled(c) if end.name == name}
     by_default = any(c.coordinates is None for c in couplings)

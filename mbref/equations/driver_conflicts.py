@@ -128,7 +128,8 @@ def _compared(model: Model, until: float) -> tuple[np.ndarray, _Limits]:
     paced = np.interp(np.arange(0.0, way[-1], LARGEST_MOTION)[:MOST_TIMES], way, even)
     places = np.arange(COMPARED_TIMES - 1)
     shifted = until * (places + 0.8 * (places * GOLDEN_RATIO % 1.0)) / (COMPARED_TIMES - 1)
-    rows = [t for driver in model.scene.driver for t, _ in driver.table or () if 0.0 < t < until]
+    functions = [function for driver in model.scene.driver for function in driver.functions]
+    rows = [t for function in functions for t, _ in function.table or () if 0.0 < t < until]
     times = np.unique(np.concatenate([shifted, paced, rows, [until]]))[:MOST_TIMES]
     gap = max(CONFLICT, ROUNDED_VALUE * np.abs(values).max())
     rate = RATE_CONFLICT * fastest_rate(model.scene, model.length, until) + RATE_SHARE / (until or np.inf)
@@ -143,9 +144,10 @@ def fastest_rate(scene: Scene, length: float, until: float) -> float:
 
 
 def _driven_way(scene: Scene, length: float, times: np.ndarray) -> np.ndarray:
-    """Return the values (drivers, k) of drivers at times (k,), in lengths (m) or rad."""
+    """Return the values (f, k) of functions of drivers at times (k,), in lengths (m) or rad."""
     slides = {joint.name for joint in scene.joint if joint.facts.driven == "displacement"}
-    values = [d.values(times) / (length if d.joint in slides else 1.0) for d in scene.driver]
+    functions = [(length if d.joint in slides else 1.0, f) for d in scene.driver for f in d.functions]
+    values = [function.values(times) / unit for unit, function in functions]
     return np.reshape(values, (-1, len(times)))
 
 

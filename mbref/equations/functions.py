@@ -6,10 +6,13 @@ start of the step, so that no integrator sees a jump.
 
 from __future__ import annotations
 
+import itertools
+
 from numpy import cos, inf, sin
 
 from mbref.kernels.compilation import kernel
-from mbref.scene import Sine, TimeFunction
+from mbref.scene import Scene, Sine, TimeFunction
+from mbref.scene.scene import functions_of
 
 AT_REST = Sine(amplitude=0.0, frequency=0.0, phase=0.0)
 
@@ -23,6 +26,15 @@ def numbers_of(function: TimeFunction, terms: int) -> tuple[float, ...]:
 def pieces_of(function: TimeFunction) -> list[tuple[float, ...]]:
     """Return begin, part and cubic of each piece of a function."""
     return [(piece.begin, piece.part, *piece.cubic) for piece in function.pieces()]
+
+
+def functions_of_drivers(scene: Scene) -> dict[str, tuple[int, ...]]:
+    """Return by joint the indices, in ``functions_of``, of the functions of its driver."""
+    further = itertools.count(len(functions_of(scene)) - sum(d.rows - 1 for d in scene.driver))
+    return {
+        driver.joint: (k, *(next(further) for _ in driver.functions[1:]))
+        for k, driver in enumerate(scene.driver)
+    }
 
 
 @kernel

@@ -216,7 +216,7 @@ def open_dimensions(model: Model, blocks: np.ndarray, always: int | None = None)
     rows |= {name: slice(*pair) for name, pair in zip(held, pairwise([*starts, of.size]), strict=True)}
     for d, driver in enumerate(model.scene.driver):
         row = int(model.structure.row[model.structure.driver == d][0])
-        rows[DRIVER.format(driver.joint)] = slice(row, row + 1)
+        rows[DRIVER.format(driver.joint)] = slice(row, row + driver.rows)
     found = {name: np.sum(_singular_values(vanishing[:, own]) > SHARE, axis=1) for name, own in rows.items()}
     for driver in model.scene.driver:
         found[DRIVER.format(driver.joint)] |= is_singular

@@ -16,6 +16,9 @@ from mbref.kernels.scene_layout import (
     DOT2,
     NO_SLIP,
     POINT,
+    TURN_1,
+    TURN_2,
+    TURN_3,
 )
 from mbref.rotations import Vector3
 from mbref.scene import JOINT_TYPES, Joint, SceneError
@@ -27,7 +30,7 @@ ORIGIN = (0.0, 0.0, 0.0)
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 FAR_FROM_AXIS = 0.65  # cosine of an angle, above √(1/3), which one component at least does not exceed
 ROWS_OF = {POINT: 3} | dict.fromkeys(
-    (DOT1, DOT2, DISTANCE, COUPLED_ANGLE, COUPLED_SLIDE, CONTACT, NO_SLIP), 1
+    (DOT1, DOT2, DISTANCE, COUPLED_ANGLE, COUPLED_SLIDE, CONTACT, NO_SLIP, TURN_1, TURN_2, TURN_3), 1
 )
 # directions of the first and of the second body that stay perpendicular: the first two pairs keep the axes
 # parallel, the third prevents rotation about them
@@ -44,7 +47,8 @@ class Primitive(NamedTuple):
     point_second: Vector3 = ORIGIN
     first: Vector3 = ORIGIN
     second: Vector3 = ORIGIN
-    # of drivers a direction in the first body, perpendicular to `first`; of wheels the normal of their plane
+    # of drivers a direction in the first body, perpendicular to `first`, or the axis of a turn; of wheels the
+    # normal of their plane
     turning: Vector3 = ORIGIN
     length: float = 0.0  # length of a distance constraint, radius of a wheel, or factor of a joint coordinate
     higher: tuple[float, ...] = ()  # factors of the square of a joint coordinate, and of higher powers
@@ -76,17 +80,31 @@ def wheel_rows(joint: RollingWheel) -> list[Primitive]:
     return [Primitive(kind, first, second, along, axis, normal, joint.radius) for kind, along in rows]
 
 
-def driver_primitive(joint: Joint) -> Primitive:
-    """Return the row of a driver of the joint; raises SceneError if the joint cannot be driven."""
+def driver_primitives(joint: Joint, axes: tuple[Vector3, ...]) -> list[Primitive]:
+    """Return the row of a driver of the joint, or three rows for the ``axes`` of its turns; raises SceneError
+    if the joint cannot be driven."""
+    if axes:
+        return [
+            Primitive(kind, first=AXES[j], second=AXES[k], turning=unit(axis), driven=True)
+            for kind, (j, k), axis in zip((TURN_1, TURN_2, TURN_3), WITHOUT_AXIS, axes, strict=True)
+        ]
     if joint.facts.driven is None:
         raise SceneError([f"joint {joint.name!r}: joints of type {joint.type!r} cannot be driven"])
-    return of_coordinate(joint, joint.facts.driven, (DOT1, DOT2), driven=True)
+    return [of_coordinate(joint, joint.facts.driven, (DOT1, DOT2), driven=True)]
+
+
+def function_of(primitive: Primitive, functions: Sequence[int]) -> int:
+    """Return which function of its joint's driver a primitive has; -1 for a primitive without a driver."""
+    return functions[max(0, primitive.kind - TURN_1)] if primitive.driven else -1
 
 
 @lru_cache(maxsize=MOST_JOINTS)
-def rows_of_joint(joint: Joint, is_driven: bool) -> tuple[list[Primitive], list[tuple[float, ...]]]:
-    """Return the primitives of a joint and its driver, and ``vectors_of`` each of them."""
-    found = [*primitives_of(joint), *([driver_primitive(joint)] if is_driven else [])]
+def rows_of_joint(
+    joint: Joint, driven: tuple[Vector3, ...] | None
+) -> tuple[list[Primitive], list[tuple[float, ...]]]:
+    """Return the primitives of a joint and its driver, and ``vectors_of`` each of them; ``driven`` are the
+    axes of the driver's turns, empty for the driver of a coordinate, None without a driver."""
+    found = [*primitives_of(joint), *(driver_primitives(joint, driven) if driven is not None else [])]
     return found, [*map(vectors_of, found)]
 
 

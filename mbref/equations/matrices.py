@@ -27,6 +27,9 @@ from mbref.kernels.scene_layout import (
     DOT2,
     NO_SLIP,
     POINT,
+    TURN_1,
+    TURN_2,
+    TURN_3,
 )
 
 ROW_WORDS = {
@@ -35,7 +38,7 @@ ROW_WORDS = {
 }  # fmt: skip
 ROW_UNITS = {
     POINT: "m", DOT1: "rad", DOT2: "m", DISTANCE: "m", COUPLED_ANGLE: "rad", COUPLED_SLIDE: "m", CONTACT: "m",
-    NO_SLIP: "m",
+    NO_SLIP: "m", TURN_1: "rad", TURN_2: "rad", TURN_3: "rad",
 }  # fmt: skip
 COLUMN_WORDS = ("x", "y", "z", "about x'", "about y'", "about z'")
 RANK_OF_MATRICES = 1e-10  # singular value of unit rows / largest one, below which a row counts as dependent

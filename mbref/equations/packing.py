@@ -15,8 +15,8 @@ import numpy as np
 
 from mbref import rotations
 from mbref.equations.couplings import coordinate_primitives, couplings_of
-from mbref.equations.functions import numbers_of, pieces_of
-from mbref.equations.joints import Primitive, rows_of_joint, vectors_of
+from mbref.equations.functions import functions_of_drivers, numbers_of, pieces_of
+from mbref.equations.joints import Primitive, function_of, rows_of_joint, vectors_of
 from mbref.equations.largest_distance import characteristic_lengths
 from mbref.equations.load_numbers import (
     Values,
@@ -78,8 +78,8 @@ class Packs:
         self.index.setdefault(GROUND, self.nb)
         self.index[FRAME] = self.nb
         joints = [joint for joints in self.joints for joint in joints]
-        driven = {driver.joint: k for k, driver in enumerate(scenes[0].driver)}
-        of_joints = _once(lambda joint: rows_of_joint(joint, joint.name in driven), joints)
+        of_joints = self._rows_of_joints(joints)
+        driven = functions_of_drivers(scenes[0])
         of_couplings = [[*map(coordinate_primitives, found)] for found in self._coupled]
         self.structure = self._structure([found for found, _ in of_joints], of_couplings[0], driven)
         bodies = self._bodies()
@@ -101,6 +101,15 @@ class Packs:
             functions=self._functions(),
             loads=loads,
         )
+
+    def _rows_of_joints(self, joints: Sequence[Joint]) -> list[tuple[list[Primitive], list[Values]]]:
+        """Return primitives and their numbers of the joints of all scenes, with their drivers."""
+        of_scenes = [{d.joint: tuple(turn.axis for turn in d.turns) for d in s.driver} for s in self.scenes]
+        if not any(axes for driven in of_scenes for axes in driven.values()):
+            names = of_scenes[0]
+            return _once(lambda joint: rows_of_joint(joint, names.get(joint.name)), joints)
+        pairs = zip(of_scenes, self.joints, strict=True)
+        return [rows_of_joint(joint, driven.get(joint.name)) for driven, own in pairs for joint in own]
 
     def _in_order(
         self,
@@ -130,7 +139,7 @@ class Packs:
         self,
         primitives: Sequence[Sequence[Primitive]],
         coupled: Sequence[tuple[Primitive, ...]],
-        driven: Mapping[str, int],
+        driven: Mapping[str, tuple[int, ...]],
     ) -> Structure:
         """Return the structure of the scenes, found once for each shape."""
         shape = self.kinematic, shape_of(self.scenes[0])
@@ -144,7 +153,7 @@ class Packs:
         self,
         primitives: Sequence[Sequence[Primitive]],
         coupled: Sequence[tuple[Primitive, ...]],
-        driven: Mapping[str, int],
+        driven: Mapping[str, tuple[int, ...]],
     ) -> Places:
         """Return the first scene without its numbers, from the primitives of its joints and couplings."""
         scene, joints = self.scenes[0], self.joints[0]
@@ -156,7 +165,7 @@ class Packs:
         return Places(
             nb=self.nb,
             primitives=tuple(
-                PrimitivePlace(p.kind, joint.name, first, second, driven[joint.name] if p.driven else -1)
+                PrimitivePlace(p.kind, joint.name, first, second, function_of(p, driven.get(joint.name, ())))
                 for joint, (first, second), found in zip(joints, ends, primitives, strict=False)
                 for p in found
             )

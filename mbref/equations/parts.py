@@ -22,7 +22,7 @@ def shape_of(scene: Scene) -> Hashable:
         tuple((body.name, body.inertia and isinstance(body.inertia[0], tuple)) for body in scene.body),
         tuple((j.name, j.type, j.bodies, j.reflected_inertia > 0.0) for j in scene.joint),
         tuple((each.name, each.joints, each.coordinates, each.powers) for each in scene.coupling),
-        tuple((driver.joint, *_shape_of_function(driver)) for driver in scene.driver),
+        tuple((driver.joint, *map(_shape_of_function, driver.functions)) for driver in scene.driver),
         tuple(
             (load.type, getattr(load, load.acts_on), *_shape_of_function(load.over_time))
             for load in scene.load

@@ -11,7 +11,7 @@ import numpy as np
 from mbref import rotations
 from mbref.equations.joint_angles import angles_by_joint, angles_of_pose
 from mbref.equations.model import Model
-from mbref.scene import Joint, Load, Scene, SlideSpring, TorsionSpring
+from mbref.scene import Driver, Joint, Load, Scene, SlideSpring, TorsionSpring, Turn
 from mbref.scene.joints import DISPLACEMENT, Coordinate
 from mbref.scene.rolling import RollingLine, RollingWheel
 
@@ -31,7 +31,8 @@ def placed(model: Model, q: np.ndarray) -> Scene:
     ]
     joints = [joint.model_copy(update=_moved_geometry(model, joint, q)) for joint in scene.joint]
     loads = [load.model_copy(update=_moved_points(model, load, q)) for load in scene.load]
-    return scene.with_(body=bodies, joint=joints, load=loads)
+    drivers = [driver.model_copy(update={"turn": _carried(model, driver, q)}) for driver in scene.driver]
+    return scene.with_(body=bodies, joint=joints, load=loads, driver=drivers)
 
 
 def placed_with_springs(model: Model, q: np.ndarray, angles: Mapping[str, float] | None = None) -> Scene:
@@ -94,6 +95,13 @@ def _moved_geometry(model: Model, joint: Joint, q: np.ndarray) -> dict[str, Any]
     else:
         found["anchor"] = place(model, *ends[1], q)
     return {key: value for key, value in found.items() if key in type(joint).model_fields}
+
+
+def _carried(model: Model, driver: Driver, q: np.ndarray) -> tuple[Turn, ...]:
+    """Return the turns of a driver about axes that the first body of its joint carries to coordinates q."""
+    first = model.scene.joint_named(driver.joint).bodies[0]
+    axes = [_rounded(_direction(model, first, turn.axis, q)) for turn in driver.turn]
+    return tuple(turn.model_copy(update={"axis": axis}) for turn, axis in zip(driver.turn, axes, strict=True))
 
 
 def _moved_points(model: Model, load: Any, q: np.ndarray) -> dict[str, Any]:

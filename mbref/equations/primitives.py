@@ -10,8 +10,8 @@ rotation matrix of a body, the constraint equations Φ = 0 are
     distance   (d·d - l²) / (2 l) = 0
 
 A driver is a dot-1 constraint whose vector a turns in body i by the prescribed angle, or a dot-2 constraint
-minus the prescribed displacement.  A coupling is one row, the sum of polynomials f(q) = c₁ q + c₂ q² + … of
-joint coordinates q:
+minus the prescribed displacement; of an orientation it is three dot-1 constraints (``equations.turns``).  A
+coupling is one row, the sum of polynomials f(q) = c₁ q + c₂ q² + … of joint coordinates q:
 
     angle      arctan2(s, c),  s = (A_j u)·(A_i y),  c = (A_j u)·(A_i x)
     slide      (A_i a)·d
@@ -29,9 +29,10 @@ from __future__ import annotations
 from numpy import arctan2, cos, floor, pi, sin
 
 from mbref.equations.functions import function_value
+from mbref.equations.turns import oriented_direction
 from mbref.equations.wheels import wheel
 from mbref.kernels.compilation import inlined, kernel
-from mbref.kernels.scene_layout import CONTACT, COUPLED_ANGLE, DISTANCE, DOT1, DOT2, POINT
+from mbref.kernels.scene_layout import CONTACT, COUPLED_ANGLE, DISTANCE, DOT1, DOT2, POINT, TURN_1
 from mbref.linear_algebra.vectors import (
     accumulate,
     add,
@@ -100,6 +101,8 @@ def turned_direction(p, t, equations):
     x, d = vector(primitives.direction_first, p), primitives.driver[p]
     if d < 0:
         return x, NOTHING, NOTHING
+    if primitives.kind[p] >= TURN_1:
+        return oriented_direction(p, t, equations)
     y = vector(primitives.turning_first, p)
     value, rate, acceleration = function_value(d, t, equations)
     along = add(scale(cos(value), x), scale(sin(value), y))
@@ -292,7 +295,7 @@ def constraints(t, equations):
     for p in range(kinds.shape[0]):
         if kinds[p] == POINT:
             point(p, equations)
-        elif kinds[p] == DOT1:
+        elif kinds[p] == DOT1 or kinds[p] >= TURN_1:
             dot1(p, t, equations)
         elif kinds[p] == DOT2:
             dot2(p, t, equations)

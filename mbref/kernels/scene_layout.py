@@ -12,6 +12,8 @@ from mbref.kernels.named_memory import IndexTable, Indices, Matrix, Vector
 
 # kinds of primitive constraints
 POINT, DOT1, DOT2, DISTANCE, COUPLED_ANGLE, COUPLED_SLIDE, CONTACT, NO_SLIP = range(8)
+# dot-1 constraints whose first direction all three turns of a driver turn; each has the axis of one turn
+TURN_1, TURN_2, TURN_3 = range(8, 11)
 # kinds of loads: on a body, between points, of a joint's coordinate, and against relative rotation and motion
 MOMENT, FORCE, SPRING, ABOUT_AXIS, ALONG_AXIS, TURN_DAMPER, POINT_DAMPER = range(7)
 
@@ -42,7 +44,8 @@ class Primitives(NamedTuple):
     point_first: Annotated[Matrix, "p", 3]
     point_second: Annotated[Matrix, "p", 3]
     direction_first: Annotated[Matrix, "p", 3]
-    # direction_first rotated by 90°, if a driver rotates it; the normal of the plane on which a wheel rolls
+    # direction_first rotated by 90°, if a driver rotates it; the axis of a turn of a driven orientation; the
+    # normal of the plane on which a wheel rolls
     turning_first: Annotated[Matrix, "p", 3]
     direction_second: Annotated[Matrix, "p", 3]
     # length of a distance constraint or radius of a wheel (m), or the factor of a joint coordinate
@@ -61,7 +64,7 @@ class TurningJoints(NamedTuple):
 
 
 class Functions(NamedTuple):
-    """Functions of time, drivers' first (rad or m), then factors of loads.
+    """Functions of time, drivers' first (rad or m), then factors of loads, then further turns of drivers.
 
     On a piece: part (amplitude sin(frequency t + phase) + Σ polynomial[k] t^k) + Σ cubic[k] (t - begin)^k.
     """

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mbref.motions.driving_forces import driving_forces
+from mbref.motions.driving_forces import driving_forces, driving_moment
 from mbref.motions.joint_motion import along, angular_velocity_of, joint_motion, position_of, velocity_of
 from mbref.motions.trajectory import Trajectory
 from mbref.rotations import cross
@@ -42,14 +42,17 @@ class DriverMotion:
     force : ndarray, shape (k,), or None
         Force along the axis, N, of a translational joint.
     torque : ndarray, shape (k,), or None
-        Torque about the axis, N m, of a revolute or cylindrical joint.
+        Torque about the axis, N m, of a revolute, cylindrical or planar joint.
     power : ndarray, shape (k,), or None
-        Power into the mechanism, W: torque times rate of the angle, or force times rate of the displacement.
+        Power into the mechanism, W: torque times rate of the angle, force times rate of the displacement, or
+        moment times relative angular velocity.
     open : ndarray, shape (k,), or None
         1 where equilibrium does not determine the force or torque, because another driver or constraint can
         replace the driver; otherwise 0. None if the engine does not give it.
+    moment : ndarray, shape (k, 3), or None
+        Moment on the second body, N m, world axes, of a ball joint with driven orientation.
 
-    Force, torque and power are None without masses, and without reactions or accelerations that they need.
+    All these are None without masses, and without reactions or accelerations that they need.
     """
 
     joint: str
@@ -57,6 +60,7 @@ class DriverMotion:
     torque: np.ndarray | None
     power: np.ndarray | None
     open: np.ndarray | None = None
+    moment: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,8 +112,13 @@ def driver_motion(scene: Scene, motion: Trajectory, name: str) -> DriverMotion:
     if name not in driven:
         raise KeyError(f"no driver of a joint {name!r}; driven joints: {', '.join(driven) or 'none'}")
     joint = scene.joint_named(name)
-    coordinate = joint.facts.driven or ANGLE
+    coordinate = joint.facts.driven
     marks = (motion.open_reactions or {}).get(DRIVER.format(name))
+    if coordinate is None:
+        moment = driving_moment(motion, name)
+        first, second = (angular_velocity_of(scene, motion, body) for body in joint.bodies)
+        power = None if moment is None else np.einsum("ki,ki->k", moment, second - first)
+        return DriverMotion(name, None, None, power, marks, moment)
     size = driving_forces(scene, motion).get(name)
     if size is None:
         return DriverMotion(name, None, None, None, marks)

@@ -43,7 +43,7 @@ def driving_forces(scene: Scene, motion: Trajectory) -> dict[str, np.ndarray]:
         names = [driver.joint for driver in scene.driver]  # without contacts at end stops
         known = names if parts and all(parts) else ()
         return {name: np.concatenate([part[name] for part in parts]) for name in known}
-    driven = [scene.joint_named(driver.joint) for driver in scene.driver]
+    driven = [scene.joint_named(driver.joint) for driver in scene.driver if not driver.turn]
     unknown: list[dict[Any, Any]] = [{(joint.name, joint.facts.driven): 1.0} for joint in driven]
     unknown += [_slopes(scene, motion, coupling) for coupling in scene.coupling]
     coordinates = list(dict.fromkeys(coordinate for shares in unknown for coordinate in shares))
@@ -55,6 +55,13 @@ def driving_forces(scene: Scene, motion: Trajectory) -> dict[str, np.ndarray]:
     shares_of = np.linalg.pinv(np.moveaxis(np.array(rows), 2, 0), rcond=REPLACEABLE)
     forces = np.moveaxis(shares_of @ np.array(found).T[:, :, None], 0, 1)[..., 0]
     return {joint.name: size for joint, size in zip(driven, forces, strict=False)}
+
+
+def driving_moment(motion: Trajectory, name: str) -> np.ndarray | None:
+    """Return the moment (k, 3), N m, world axes, of the driver of a ball joint's orientation on the second
+    body: the joint's own reaction has no moment. None without reactions."""
+    wrench = (motion.reactions or {}).get(name)
+    return None if wrench is None else wrench[:, 3:]
 
 
 def _slopes(scene: Scene, motion: Trajectory, coupling: Coupling) -> dict[Any, Any]:

@@ -29,9 +29,10 @@ from mbref.motions.motion import Motion
 from mbref.motions.motor_motion import MotorMotion
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Joint, Scene, intermittent
+from mbref.scene.driver_faults import DRIVABLE
 from mbref.scene.fields import meant
 from mbref.scene.joints import ANGLE
-from mbref.scene.validation import DRIVABLE
+from mbref.scene.structure import EQUIVALENT_HINGES, turned_ball
 
 # work that motors cannot do / largest work of the drivers, and / work of each driver's force alone along the
 # same velocity, below either of which it is rounding
@@ -130,6 +131,10 @@ def check_motors(scene: Scene, motors: Sequence[str]) -> None:
         raise InputError("motors: needs at least one joint, and each joint once")
     if not scene.driver:
         raise InputError(f"{scene.name} has no driver whose motion motors could cause")
+    if path := turned_ball(scene):
+        raise InputError(
+            f"{path}: inverse dynamics by motors knows no driven orientation; {EQUIVALENT_HINGES}"
+        )
     if path := next(intermittent(scene), ""):
         raise InputError(f"{path}: inverse dynamics needs constraints that always hold")
 

@@ -37,6 +37,7 @@ ACCELERATIONS = "accelerations, which the engine does not give"
 SECOND_RUN = "a second run: mbref run without --estimate no, or mbref.with_error_estimate before"
 TURNING = "a joint that turns about one axis"
 SLIDING = "a joint that slides along one axis"
+ORIENTED_BALL = "a ball joint with driven orientation"
 LOAD_ABOUT_AXIS = "a load about a joint's axis"
 LOAD_ALONG_AXIS = "a load along a joint's axis"
 SOMETIMES = "joints or couplings with intervals (`active`)"
@@ -112,6 +113,9 @@ OUTPUTS = (
         "",
         "torque on the second body about the axis of a turning joint",
         f"{MASSES}, and {TURNING}",
+    ),
+    Output(
+        "driver", "moment", "N m", "xyz", "moment on the second body, world", f"{MASSES}, and {ORIENTED_BALL}"
     ),
     Output(
         "driver", "power", "W", "", "power into the mechanism: torque times rate, or force times rate", MASSES

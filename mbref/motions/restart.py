@@ -46,7 +46,7 @@ def scene_at(scene: Scene, motion: Trajectory, t: float) -> Scene:
     ]
     return placed.with_(
         body=bodies,
-        driver=[driver.from_time(at) for driver in scene.driver],
+        driver=[driver.from_time(at) for driver in placed.driver],
         load=[_from_time(load, at) for load in placed.load],
         duration=scene.duration - at if scene.duration > at else scene.duration,
     )

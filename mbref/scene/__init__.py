@@ -9,7 +9,7 @@ of the faulty value.
 
 from __future__ import annotations
 
-from mbref.scene.bodies import Body, Driver
+from mbref.scene.bodies import Body, Driver, Turn
 from mbref.scene.conditions import Release, When
 from mbref.scene.couplings import Coupling
 from mbref.scene.functions import Factor, Sine, TimeFunction
@@ -43,10 +43,17 @@ from mbref.scene.loads import (
     Spring,
     TorsionSpring,
 )
+from mbref.scene.references import GROUND
 from mbref.scene.rolling import Rolling, RollingLine, RollingWheel
 from mbref.scene.scene import Scene
-from mbref.scene.structure import intermittent, refuse_intervals, refuse_rolling, rolling_wheel
-from mbref.scene.validation import GROUND, SceneError
+from mbref.scene.structure import (
+    intermittent,
+    refuse_intervals,
+    refuse_rolling,
+    refuse_turned,
+    rolling_wheel,
+)
+from mbref.scene.validation import SceneError
 
 __all__ = [
     "GROUND",
@@ -87,10 +94,12 @@ __all__ = [
     "TimeFunction",
     "TorsionSpring",
     "Translational",
+    "Turn",
     "Universal",
     "When",
     "intermittent",
     "refuse_intervals",
     "refuse_rolling",
+    "refuse_turned",
     "rolling_wheel",
 ]

@@ -6,8 +6,9 @@ import math
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
+from mbref import rotations
 from mbref.scene.fields import (
     AngularSpeed,
     Density,
@@ -32,6 +33,7 @@ from mbref.scene.validation import checked_inertia
 OF_POINT = ("name", "body", "point", "along")  # fields of a driver of a point
 ALONG_JOINT = ("name", "along")  # those that a driver of a displacement of a joint has, too
 DRIVER = "driver({})"  # name of the driver of a joint in columns and records
+MOST_TURNS = 3  # of a driver; three turns reach every orientation
 UNIT_TOLERANCE = 1e-6  # largest deviation of a quaternion from unit length that counts as rounding
 START_ROUNDING = 1e-12  # value of a driver at t = 0 / its largest term, or 1 m or rad, that is rounding
 
@@ -93,7 +95,52 @@ def _in_si(value: Any) -> Any:
     return [*map(_in_si, value)] if isinstance(value, list | tuple) else number_in("inertia")(value)
 
 
-class Driver(TimeFunction):
+class _FromZero(TimeFunction):
+    """A function of time of a driver: zero at t = 0, with a field ``polynomial``."""
+
+    @field_validator("polynomial", check_fields=False)
+    @classmethod
+    def _motion_begins_at_zero(cls, polynomial: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+        if not {"sine", "table"} <= info.data.keys():
+            return polynomial  # a fault of another field is reported
+        sine, table = info.data["sine"], info.data["table"]
+        start = polynomial[0] + (sine.amplitude * math.sin(sine.phase) if sine else 0.0)
+        size = abs(polynomial[0]) + (abs(sine.amplitude) if sine else 0.0)
+        what = "c0 + amplitude·sin(phase) must be 0, motion is measured from t = 0"
+        if table:
+            rows = {"table": table, "periodic": info.data["periodic"]}
+            start += cls.model_construct(sine=None, polynomial=(0.0,), **rows).pieces()[0].cubic[0]
+            size += max(abs(value) for _, value in table)
+            what = "the value at t = 0 must be 0, because the motion is measured from its start"
+        if abs(start) > START_ROUNDING * max(1.0, size):
+            raise ValueError(f"{what}; got {start:g}")
+        return polynomial
+
+    def from_time(self, t: float) -> Self:
+        """Return the function of the time since t (s), of the motion since then."""
+        fields = self._delayed(t)
+        at_start = float(self.model_copy(update={**fields}).values(np.zeros(1))[0])
+        first, *others = fields["polynomial"]
+        return self.model_copy(update={**fields, "polynomial": (first - at_start, *others)})
+
+
+class Turn(_FromZero):
+    """A turn of a driven ball joint about an ``axis``, by the angle polynomial + sine + table (rad).
+
+    The axis is a direction of the world at t = 0; the turns before it carry it.
+    """
+
+    axis: VectorValue
+    polynomial: Annotated[Measures, Field(validate_default=True)] = (0.0,)
+
+    _axis = field_validator("axis")(direction)
+
+    @property
+    def coefficients(self) -> tuple[float, ...]:
+        return self.polynomial
+
+
+class Driver(_FromZero):
     """Prescribed motion of the second body of ``joint`` relative to the first, from t = 0.
 
     value(t) = c0 + c1 t + c2 t² + … + sine + table: the angle of a revolute, cylindrical or planar joint
@@ -102,6 +149,8 @@ class Driver(TimeFunction):
     joint lets the bodies move, it is the displacement along this direction.
     In place of a joint, a ``name``, a ``body``, its ``point`` (world at t = 0) and a world direction
     ``along`` prescribe the displacement of a point; a read scene has a free joint in place of a direction.
+    Of a spherical joint, one to three ``turn`` entries prescribe the orientation: R₁ R₂ R₃, with turns Rₖ
+    about axes that the first body carries.
     """
 
     name: Name | None = None
@@ -110,6 +159,7 @@ class Driver(TimeFunction):
     along: VectorValue | None = None
     joint: Annotated[Name, Field(validate_default=True)] = ""
     polynomial: Annotated[Measures, Field(validate_default=True)] = (0.0,)
+    turn: Annotated[tuple[Turn, ...], Field(max_length=MOST_TURNS), BeforeValidator(as_list)] = ()
 
     @field_validator("along")
     @classmethod
@@ -130,31 +180,56 @@ class Driver(TimeFunction):
             return joint or info.data.get("name")
         raise ValueError("is required" + f", or {', '.join(missing)} of the driven point" * bool(given))
 
-    @field_validator("polynomial")
+    @field_validator("turn")
     @classmethod
-    def _motion_begins_at_zero(cls, polynomial: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
-        if not {"sine", "table"} <= info.data.keys():
-            return polynomial  # a fault of another field is reported
-        sine, table = info.data["sine"], info.data["table"]
-        start = polynomial[0] + (sine.amplitude * math.sin(sine.phase) if sine else 0.0)
-        size = abs(polynomial[0]) + (abs(sine.amplitude) if sine else 0.0)
-        what = "c0 + amplitude·sin(phase) must be 0, motion is measured from t = 0"
-        if table:
-            rows = {"table": table, "periodic": info.data["periodic"]}
-            start += cls.model_construct(sine=None, polynomial=(0.0,), **rows).pieces()[0].cubic[0]
-            size += max(abs(value) for _, value in table)
-            what = "the value at t = 0 must be 0, because the motion is measured from its start"
-        if abs(start) > START_ROUNDING * max(1.0, size):
-            raise ValueError(f"{what}; got {start:g}")
-        return polynomial
+    def _turns_replace_the_function(cls, turn: tuple[Turn, ...], info: ValidationInfo) -> tuple[Turn, ...]:
+        given = [field for field in (*TimeFunction.model_fields, *OF_POINT) if info.data.get(field)]
+        given += ["polynomial"] * any(info.data.get("polynomial", ()))
+        if turn and given:
+            raise ValueError(f"prescribes the whole orientation; {given[0]} belongs into its entries")
+        return turn
 
     @property
     def coefficients(self) -> tuple[float, ...]:
         return self.polynomial
 
-    def from_time(self, t: float) -> Driver:
-        """Return the driver as a function of the time since t (s), of the motion since then."""
-        fields = self._delayed(t)
-        at_start = float(self.model_copy(update={**fields}).values(np.zeros(1))[0])
-        first, *others = fields["polynomial"]
-        return self.model_copy(update={**fields, "polynomial": (first - at_start, *others)})
+    @property
+    def functions(self) -> tuple[TimeFunction, ...]:
+        """The driver's function of time, or the angles of three turns, of which the last ones may be
+        still."""
+        return self.turns or (self,)
+
+    @property
+    def turns(self) -> tuple[Turn, ...]:
+        """Three turns of a driven orientation, of which the last ones may be still; otherwise none."""
+        still = Turn(axis=(0.0, 0.0, 1.0))
+        return (*self.turn, *[still] * (MOST_TURNS - len(self.turn))) if self.turn else ()
+
+    @property
+    def rows(self) -> int:
+        """Number of constraint rows."""
+        return len(self.functions)
+
+    @property
+    def is_constant(self) -> bool:
+        return all(turn.is_constant for turn in self.turn) if self.turn else super().is_constant
+
+    def repeated(self, until: float) -> Self:
+        if not self.turn:
+            return super().repeated(until)
+        turn = tuple(each.repeated(until) for each in self.turn)
+        same = all(a is b for a, b in zip(turn, self.turn, strict=True))
+        return self if same else self.model_copy(update={"turn": turn})
+
+    def from_time(self, t: float) -> Self:
+        """Return the driver as a function of the time since t (s), of the motion since then; the first body
+        has not turned."""
+        if not self.turn:
+            return super().from_time(t)
+        found, carried = [], np.array([1.0, 0.0, 0.0, 0.0])
+        for each in self.turn:
+            axis = rotations.rotate(carried, rotations.unit(each.axis))
+            angle = float(each.values(np.array([t]))[0])
+            carried = rotations.multiply(rotations.from_vector(angle * axis), carried)
+            found.append(each.from_time(t).model_copy(update={"axis": tuple(axis.tolist())}))
+        return self.model_copy(update={"turn": tuple(found)})

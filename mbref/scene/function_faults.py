@@ -49,6 +49,15 @@ def table_faults(path: str, function: Any, data: Mapping[str, Any], start: float
 def unit_faults(path: str, driver: Any, joint: Any) -> Faults:
     """Yield faults of units that do not fit the coordinate that a driver prescribes."""
     driven = JOINT_TYPES[joint].facts.driven if joint in JOINT_TYPES else None
+    yield from _faults_of_units(path, driver, driven, f"a {joint} joint")
+
+
+def turn_faults(path: str, turn: Any) -> Faults:
+    """Yield faults of units that are none of an angle."""
+    yield from _faults_of_units(path, turn, "angle", "a turn")
+
+
+def _faults_of_units(path: str, driver: Any, driven: str | None, of: str) -> Faults:
     quantity = QUANTITY_OF.get(str(driven))
     found = [("sine.amplitude", field_of(field_of(driver, "sine"), "amplitude"), 0)]
     found += [(f"polynomial[{k}]", term, k) for k, term in enumerate(listed(field_of(driver, "polynomial")))]
@@ -59,7 +68,7 @@ def unit_faults(path: str, driver: Any, joint: Any) -> Faults:
             over = f", also over s^{power}" * bool(power)
             yield (
                 f"{path}.{field}",
-                f"prescribes the {driven} of a {joint} joint, a unit of {quantity}{over}, got {value!r}",
+                f"prescribes the {driven} of {of}, a unit of {quantity}{over}, got {value!r}",
             )
 
 

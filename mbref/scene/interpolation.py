@@ -18,10 +18,10 @@ BETWEEN_ROWS = 8  # points between two rows
 def interpolation_notes(scene: Scene) -> Iterator[str]:
     """Yield a sentence on each table whose interpolation leaves its values, or accelerations, uncertain."""
     for driver in scene.driver:
-        if driver.table is not None:
-            turns = scene.joint_named(driver.joint).facts.driven == "angle"
-            unit = "rad/s²" if turns else "m/s²"
-            yield from _note(f"driver({driver.joint})", driver, 2, f" {unit}", "acceleration")
+        unit = "m/s²" if scene.joint_named(driver.joint).facts.driven == "displacement" else "rad/s²"
+        for function in driver.functions:
+            if function.table is not None:
+                yield from _note(f"driver({driver.joint})", function, 2, f" {unit}", "acceleration")
     for k, load in enumerate(scene.load):
         if load.over_time is not None and load.over_time.table is not None:
             yield from _note(f"load({k})", load.over_time, 0, "", "factor")

@@ -16,6 +16,13 @@ NEED_A_HOLDING_JOINT = "armature", "stop"  # fields of a joint
 ALL_ROTATIONS = 3  # rotations that a joint with a single point leaves free
 
 
+def comes_and_goes(data: Mapping[str, Any]) -> Iterator[bool]:
+    """Yield for each joint and coupling whether it has intervals, a condition, or an end stop."""
+    for key in ("joint", "coupling"):
+        for entry in listed(data.get(key, ())):
+            yield any(field_of(entry, field) is not None for field in (*COMES_AND_GOES, "stop"))
+
+
 def _text(entry: Any, key: str) -> str:
     """Return a name or type of an entry; empty if it is no text, which its field reports."""
     found = field_of(entry, key)

@@ -62,6 +62,11 @@ class JointFacts:
         return self.forbidden_rotations == (X, Y)
 
     @property
+    def oriented(self) -> bool:
+        """True if a driver can prescribe the relative orientation: a ball joint."""
+        return self.forbidden_translations == (X, Y, Z) and self.free_rotations == len((X, Y, Z))
+
+    @property
     def coordinates(self) -> tuple[Coordinate, ...]:
         """Joint coordinates that can be coupled: the angle about the axis, the displacement along it."""
         angle = (ANGLE,) if self.turns else ()

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError, model_validator
 
 from mbref.files import write
-from mbref.scene.bodies import OF_POINT, Body, Driver
+from mbref.scene.bodies import OF_POINT, Body, Driver, Turn
 from mbref.scene.conditions import Release, When
 from mbref.scene.couplings import Coupling
 from mbref.scene.fields import Acceleration, EntryType, LaterTime, Name, SceneEntry, Three
@@ -17,9 +17,10 @@ from mbref.scene.functions import Factor, Sine, TimeFunction
 from mbref.scene.joints import Coordinate, Free, Joint
 from mbref.scene.loads import Load
 from mbref.scene.paths import replaced_at
+from mbref.scene.references import GROUND
 from mbref.scene.stops import Stop
 from mbref.scene.toml import as_lists, read_toml, scene_text, with_lines
-from mbref.scene.validation import GROUND, SceneError, field_faults, named_paths, reference_faults
+from mbref.scene.validation import SceneError, field_faults, named_paths, reference_faults
 
 ROUNDED_END = 1e-12  # of an end time, by which sums of steps may miss the duration
 
@@ -256,14 +257,18 @@ class Scene(SceneEntry):
 
 
 def functions_of(scene: Scene) -> list[TimeFunction]:
-    """Return the functions of time of a scene: of drivers, then of loads if bodies have masses."""
+    """Return the functions of time of a scene: of drivers, then of loads if bodies have masses, then of
+    second and third turns of driven orientations."""
     loads = scene.load if scene.has_mass() else ()
-    return [*scene.driver, *(load.over_time for load in loads if load.over_time)]
+    of_drivers = [driver.functions for driver in scene.driver]
+    further = [function for functions in of_drivers for function in functions[1:]]
+    of_loads = [load.over_time for load in loads if load.over_time]
+    return [*(functions[0] for functions in of_drivers), *of_loads, *further]
 
 
 FIELDS_OF_TABLES = {"": tuple(Scene.model_fields)} | {
     table.__name__.lower(): tuple(table.model_fields)
-    for table in (Body, Coupling, Driver, Sine, Factor, When, Release, Stop)
+    for table in (Body, Coupling, Driver, Turn, Sine, Factor, When, Release, Stop)
 }
 
 

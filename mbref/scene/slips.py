@@ -10,8 +10,9 @@ import numpy as np
 
 from mbref import rotations
 from mbref.scene.fields import COINCIDENT
+from mbref.scene.functions import TimeFunction
+from mbref.scene.references import GROUND
 from mbref.scene.scene import Scene
-from mbref.scene.validation import GROUND
 
 TURN = 2 * math.pi
 QUARTER = 90  # degrees; likely angles are multiples of it
@@ -47,18 +48,26 @@ def link_lengths(scene: Scene) -> dict[str, dict[str, float]]:
     return {name: lengths for name, lengths in found.items() if lengths}
 
 
+def _prescribed(scene: Scene) -> Iterator[tuple[str, TimeFunction, bool]]:
+    """Yield path and function of each driver and turn, and whether the function is an angle."""
+    for driver in scene.driver:
+        turns = scene.joint_named(driver.joint).facts.driven != "displacement"
+        path = f"driver[{driver.joint}]"
+        for k, function in enumerate(driver.turn or (driver,)):
+            yield f"{path}.turn[{k}]" if driver.turn else path, function, turns
+
+
 def _angles(scene: Scene) -> Iterator[str]:
     for i, load in enumerate(scene.load):
         if load.type == "torsion_spring" and _may_be_degrees(load.natural_angle):
             yield _degrees(f"load[{i}].natural_angle", load.natural_angle)
-    for driver in scene.driver:
-        path, sine = f"driver[{driver.joint}]", driver.sine
-        turns = scene.joint_named(driver.joint).facts.driven == "angle"
+    for path, function, turns in _prescribed(scene):
+        sine = function.sine
         if sine and _may_be_degrees(sine.phase):
             yield _degrees(f"{path}.sine.phase", sine.phase)
         if sine and turns and _may_be_degrees(sine.amplitude):
             yield _degrees(f"{path}.sine.amplitude", sine.amplitude)
-        rate = driver.polynomial[1] if len(driver.polynomial) > 1 else 0.0
+        rate = function.coefficients[1] if len(function.coefficients) > 1 else 0.0
         if turns and rate and rate % QUARTER == 0:
             yield f"{path}.polynomial: {rate:g} rad/s is {rate / TURN:.3g} turns a second; is it in degrees?"
 
@@ -171,12 +180,12 @@ def _no_joints(scene: Scene) -> Iterator[str]:
 def _far_drivers(scene: Scene) -> Iterator[str]:
     """Yield drivers that turn a joint by many turns before the end of the motion."""
     times = np.linspace(0.0, scene.duration, INSTANTS)
-    for driver in scene.driver:
-        furthest = float(np.abs(driver.values(times)).max())
-        has_unit = any(driver.polynomial) and all(_is_round(math.degrees(c)) for c in driver.polynomial)
-        turns = scene.joint_named(driver.joint).facts.driven == "angle"
+    for path, function, turns in _prescribed(scene):
+        furthest = float(np.abs(function.values(times)).max())
+        terms = function.coefficients
+        has_unit = any(terms) and all(_is_round(math.degrees(c)) for c in terms)
         if turns and furthest > FURTHEST and not has_unit:
             yield (
-                f"driver[{driver.joint}].polynomial: turns the joint by {furthest:.4g} rad, "
+                f"{path}.polynomial: turns the joint by {furthest:.4g} rad, "
                 f"{furthest / TURN:.3g} turns, within {scene.duration:g} s; is it in degrees?"
             )

@@ -11,11 +11,14 @@ from mbref.rotations import Vector3
 from mbref.scene.fields import COINCIDENT
 from mbref.scene.interval_faults import COMES_AND_GOES
 from mbref.scene.loads import Spring
-from mbref.scene.validation import GROUND, SceneError
+from mbref.scene.references import GROUND
+from mbref.scene.validation import SceneError
 
 if TYPE_CHECKING:
     from mbref.scene.scene import Scene
 
+# mechanism that moves like a ball joint with a driven orientation
+EQUIVALENT_HINGES = "three driven hinges with links of mass 0 between them move alike"
 SAME_DIRECTION = 1e-12  # 1 - cosine of the angle of axes that count as parallel
 
 
@@ -49,6 +52,18 @@ def refuse_rolling(scene: Scene, what: str) -> None:
 def rolling_wheel(scene: Scene) -> str:
     """Return the name of the first joint whose constraints are not integrable; empty if there is none."""
     return next((joint.name for joint in scene.joint if joint.facts.velocity_rows), "")
+
+
+def refuse_turned(scene: Scene, what: str) -> None:
+    """Raise SceneError if a driver prescribes the orientation of a ball joint, for a feature, such as
+    "equilibria", that has no equations of it."""
+    if path := turned_ball(scene):
+        raise SceneError([f"{path}: {what} know no driven orientation; {EQUIVALENT_HINGES}"])
+
+
+def turned_ball(scene: Scene) -> str:
+    """Return the path of the turns of the first driven ball joint; empty if there is none."""
+    return next((f"driver[{driver.joint}].turn" for driver in scene.driver if driver.turn), "")
 
 
 def has_massless(scene: Scene) -> bool:
@@ -98,6 +113,8 @@ def without_series(scene: Scene) -> str:
     """Return the path of the first entry of which `taylor` has no series, and why; empty if there is none."""
     if wheel := rolling_wheel(scene):
         return f"joint[{wheel}]: the velocities of a wheel that rolls without slip have no series"
+    if path := turned_ball(scene):
+        return f"{path}: a driven orientation has no series"
     for k in bushings(scene):
         return (
             f"the ends of the damped spring load[{k}] coincide at the start, so that its force has no series"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -13,17 +12,16 @@ from pydantic import ValidationError
 from mbref.printable import printable
 from mbref.scene.body_faults import mass_faults
 from mbref.scene.coupling_faults import coordinate_faults, count_faults
-from mbref.scene.driver_faults import MOVED_ALONG, direction_faults
+from mbref.scene.driver_faults import TURNS, direction_faults, driver_faults, point_faults
 from mbref.scene.fields import checked_length, checked_size, field_of, meant, shown
-from mbref.scene.function_faults import Faults, factor_faults, listed, table_faults, unit_faults
+from mbref.scene.function_faults import Faults, factor_faults, listed
 from mbref.scene.interval_faults import condition_faults, interval_faults
 from mbref.scene.joints import JOINT_TYPES
 from mbref.scene.loads import LOAD_TYPES, JointLoad
+from mbref.scene.references import GROUND, entries, joint_faults, text_of, unknown
 from mbref.scene.shapes import SHAPE_TYPES
 
-GROUND = "ground"
 RESERVED = (GROUND, "the fixed frame")  # names that no body can have
-DRIVABLE = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.driven)
 LOADED = {  # load type → joint types along whose coordinate it can act
     kind: tuple(name for name, joint in JOINT_TYPES.items() if load.coordinate in joint.facts.loaded)
     for kind, load in LOAD_TYPES.items()
@@ -43,6 +41,7 @@ NUMBERS = {  # field → content of its list; all other lists contain three numb
     "joints": "two or more names of joints",
     "coordinates": 'a list of "angle" and "displacement"',
     "ratios": "numbers, one for each joint",
+    "turn": TURNS,
     "active": "intervals of a begin and an end (s), such as [[0.0, 1.2], [2.0, 3.0]]",
 }
 PAIRS = {"table": "a time and a value", "active": "a begin and an end (s)"}  # field → pairs in its list
@@ -158,7 +157,7 @@ def _own_name(data: Mapping[str, Any], key: str, place: int) -> str:
     """Return the name of an entry if no other entry has it and a path can contain it; otherwise an empty
     text."""
     fields = ("name", "joint") if key == "driver" else ("name",)
-    names = [next(filter(None, (_text(entry, f) for f in fields)), "") for entry in _entries(data, key)]
+    names = [next(filter(None, (text_of(entry, f) for f in fields)), "") for entry in entries(data, key)]
     name = names[place] if place < len(names) else ""
     fits_a_path = not name.isdigit() and not set(name) & set("[]") and len(name) < 80 and name.isprintable()
     return name if fits_a_path and names.count(name) == 1 else ""
@@ -179,23 +178,14 @@ def _is_tag(location: Sequence[str | int], k: int) -> bool:
     return place and isinstance(location[k], str)
 
 
-def _entries(data: Mapping[str, Any], key: str) -> list[Any]:
-    return listed(data.get(key, ()))
-
-
-def _text(entry: Any, key: str) -> str:
-    """Return a text of an entry, empty if it is missing."""
-    return found if isinstance(found := field_of(entry, key), str) else ""
-
-
 def _names(entries: Sequence[Any]) -> list[str]:
-    return [_text(entry, "name") for entry in entries]
+    return [text_of(entry, "name") for entry in entries]
 
 
 def reference_faults(data: Mapping[str, Any]) -> Faults:
     """Yield faults between entries: duplicate names, unknown bodies and joints, drivers of the wrong joint.
     The arguments are raw tables, so that these faults are found together with the faults of single fields."""
-    bodies, joints = _entries(data, "body"), _entries(data, "joint")
+    bodies, joints = entries(data, "body"), entries(data, "joint")
     yield from _duplicates("body", _names(bodies), reserved=RESERVED)
     yield from _duplicates("joint", _names(joints), (GROUND,) if data.get("ground") == "body" else ())
     for i, body in enumerate(bodies):
@@ -203,33 +193,29 @@ def reference_faults(data: Mapping[str, Any]) -> Faults:
     known = {*_names(bodies), GROUND}
     for i, joint in enumerate(joints):
         yield from _pair_faults(f"joint[{i}].bodies", field_of(joint, "bodies"), known)
-    types = {_text(joint, "name"): _text(joint, "type") for joint in joints}
-    yield from _point_faults(data, types, known)
-    driven = {_text(joint, "name"): joint for joint in joints}
-    for i, driver in enumerate(_entries(data, "driver")):
-        if field_of(driver, "along") is not None and (name := _text(driver, "joint")):
-            yield from _joint_faults(
-                f"driver[{i}].joint", name, types, MOVED_ALONG, "be driven along a direction"
-            )
-            yield from direction_faults(f"driver[{i}].along", driver, driven.get(name))
-    types |= {_text(driver, "name"): "free" for driver in _entries(data, "driver") if _text(driver, "name")}
+    types = {text_of(joint, "name"): text_of(joint, "type") for joint in joints}
+    yield from point_faults(data, types, known)
+    yield from direction_faults(data, types)
+    types |= {
+        text_of(driver, "name"): "free" for driver in entries(data, "driver") if text_of(driver, "name")
+    }
     yield from _coupling_faults(data, types)
-    yield from _driver_faults(data, types)
+    yield from driver_faults(data, types)
     yield from interval_faults(data)
     yield from _condition_faults(data, types, known)
-    for i, load in enumerate(_entries(data, "load")):
-        acts_on = ACTS_ON.get(_text(load, "type"))
+    for i, load in enumerate(entries(data, "load")):
+        acts_on = ACTS_ON.get(text_of(load, "type"))
         if acts_on == "body":
             name = field_of(load, "body")
             if name == GROUND:
                 yield f"load[{i}].body", "a load cannot act on the ground"
             elif isinstance(name, str) and name not in known:
-                yield f"load[{i}].body", _unknown("body", name, known - {GROUND})
+                yield f"load[{i}].body", unknown("body", name, known - {GROUND})
         elif acts_on == "bodies":
             yield from _pair_faults(f"load[{i}].bodies", field_of(load, "bodies"), known)
         elif acts_on == "joint":
-            kind = _text(load, "type")
-            yield from _joint_faults(
+            kind = text_of(load, "type")
+            yield from joint_faults(
                 f"load[{i}].joint", field_of(load, "joint"), types, LOADED[kind], f"carry a {kind}"
             )
         yield from factor_faults(f"load[{i}].factor", field_of(load, "factor"), data)
@@ -238,17 +224,17 @@ def reference_faults(data: Mapping[str, Any]) -> Faults:
 def _coupling_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
     """Yield couplings with the name of another entry, of unknown joints, or of coordinates that a joint
     lacks."""
-    couplings = _entries(data, "coupling")
+    couplings = entries(data, "coupling")
     yield from _duplicates("coupling", _names(couplings))
     for i, coupling in enumerate(couplings):
-        if (own := _text(coupling, "name")) and own in types:
+        if (own := text_of(coupling, "name")) and own in types:
             yield f"coupling[{i}].name", f"{own!r} is already the name of a joint"
         names = listed(field_of(coupling, "joints"))
         if len(names) < 2:
             continue  # already reported as a fault of the field
         path = f"coupling[{i}].joints"
         for k, name in enumerate(names):
-            yield from _joint_faults(f"{path}[{k}]", name, types, COUPLED, "be coupled")
+            yield from joint_faults(f"{path}[{k}]", name, types, COUPLED, "be coupled")
         if all(isinstance(name, str) and types.get(name) in COUPLED for name in names):
             yield from coordinate_faults(f"coupling[{i}]", coupling, names, types)
         else:
@@ -258,43 +244,17 @@ def _coupling_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Fault
 def _condition_faults(data: Mapping[str, Any], types: Mapping[str, Any], known: set[str]) -> Faults:
     """Yield faults of the conditions of joints and couplings, with unknown joints and bodies."""
     for key in ("joint", "coupling"):
-        for i, entry in enumerate(_entries(data, key)):
+        for i, entry in enumerate(entries(data, key)):
             path, when, release = f"{key}[{i}]", field_of(entry, "when"), field_of(entry, "release")
             if when is None and release is None:
                 continue
-            yield from _joint_faults(
+            yield from joint_faults(
                 f"{path}.when.joint", field_of(when, "joint"), types, COUPLED, "be watched"
             )
             yield from _pair_faults(f"{path}.when.bodies", field_of(when, "bodies"), known)
             other = field_of(release, "joint")
-            yield from _joint_faults(f"{path}.release.joint", other, types, tuple(JOINT_TYPES), "release")
+            yield from joint_faults(f"{path}.release.joint", other, types, tuple(JOINT_TYPES), "release")
             yield from condition_faults(path, entry, types)
-
-
-def _point_faults(data: Mapping[str, Any], types: Mapping[str, Any], known: set[str]) -> Faults:
-    """Yield driven points of unknown bodies, or with the name of a joint."""
-    for i, driver in enumerate(_entries(data, "driver")):
-        if (name := _text(driver, "name")) in types and name:
-            yield f"driver[{i}].name", f"{name!r} is already the name of a joint"
-        if (body := _text(driver, "body")) == GROUND:
-            yield f"driver[{i}].body", "a point of the ground cannot be driven"
-        elif body and body not in known:
-            yield f"driver[{i}].body", _unknown("body", body, known - {GROUND})
-
-
-def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
-    """Yield drivers of unknown or wrong joints, and second drivers of a joint."""
-    driven: set[str] = set()
-    for i, driver in enumerate(_entries(data, "driver")):
-        field = "name" if _text(driver, "name") else "joint"
-        name = field_of(driver, field)
-        yield from _joint_faults(f"driver[{i}].{field}", name, types, DRIVABLE, "be driven")
-        if isinstance(name, str):
-            if name in driven:
-                yield f"driver[{i}].{field}", f"{name!r} already has a driver"
-            driven.add(name)
-            yield from unit_faults(f"driver[{i}]", driver, types.get(name))
-        yield from table_faults(f"driver[{i}].table", driver, data, 0.0, math.inf)
 
 
 def _duplicates(key: str, names: Sequence[str], reserved: Sequence[str] = ()) -> Faults:
@@ -306,25 +266,11 @@ def _duplicates(key: str, names: Sequence[str], reserved: Sequence[str] = ()) ->
             yield f"{key}[{i}].name", f"{name!r} is already the name of {key}[{first[name]}]"
 
 
-def _unknown(what: str, name: str, known: Sequence[str] | set[str]) -> str:
-    sentence = ", ".join(sorted(filter(None, known))) or "none"
-    return f"unknown {what} {name!r}; known: {sentence}{meant(name, known)}"
-
-
 def _pair_faults(path: str, pair: Any, known: set[str]) -> Faults:
     if not isinstance(pair, list | tuple) or len(pair) != 2:
         return  # already reported as a fault of the field
     for k, name in enumerate(pair):
         if isinstance(name, str) and name and name not in known:
-            yield f"{path}[{k}]", _unknown("body", name, known)
+            yield f"{path}[{k}]", unknown("body", name, known)
     if pair[0] == pair[1]:
         yield path, f"must be two different bodies, got {pair[0]!r} twice"
-
-
-def _joint_faults(path: str, name: Any, types: Mapping[str, Any], able: Sequence[str], what: str) -> Faults:
-    if not isinstance(name, str) or not name:
-        return  # already reported as a fault of the field
-    if name not in types:
-        yield path, _unknown("joint", name, list(types))
-    elif types[name] in JOINT_TYPES and types[name] not in able:
-        yield path, f"{name!r} is {types[name]}; only {', '.join(able)} joints can {what}"

@@ -162,7 +162,7 @@ def test_formulations_of_the_reference_share_no_equations_of_motion():
     natural, tree = (reached(arrows, f"crosscheck.judge.reference.{name}") for name in ("taylor", "tree"))
     shared = {name.removeprefix("crosscheck.judge.") for name in natural & tree}
     numbers = {"arithmetic", "time_functions", "reference.motion", "reference.start_velocities"}
-    joints = {"constraints", "coupling_laws", "joint_coordinates", "joint_residuals", "wheels"}
+    joints = {"constraints", "coupling_laws", "joint_coordinates", "joint_residuals", "driver_rows", "wheels"}
     without_equations = joints | {"deadline", "tolerances"}
     assert shared == numbers | without_equations, sorted(shared)
 

@@ -27,6 +27,7 @@ SOURCES = (
     ),
     JUDGE / "arithmetic.py",
     JUDGE / "constraints.py",
+    JUDGE / "driver_rows.py",
     JUDGE / "joint_residuals.py",
     JUDGE / "joint_coordinates.py",
     JUDGE / "impacts.py",

@@ -19,7 +19,7 @@ from crosscheck.judge import constraints
 from crosscheck.judge.arithmetic import Arithmetic, doubles
 from crosscheck.judge.reference.natural_joints import JointCoordinates
 from crosscheck.judge.reference.start_velocities import given
-from mbref.scene import Body, Driver, Scene, refuse_rolling
+from mbref.scene import Body, Driver, Scene, refuse_rolling, refuse_turned
 from mbref.scene.joints import DISPLACEMENT
 
 PERPENDICULAR = {
@@ -58,6 +58,7 @@ class NaturalCoordinates:
 
     def __init__(self, scene: Scene, arithmetic: Arithmetic):
         refuse_rolling(scene, "natural coordinates")
+        refuse_turned(scene, "natural coordinates")
         self.scene, self.arithmetic, self.nb = scene, arithmetic, len(scene.body)
         self.length = 2.0 ** round(np.log2(constraints.scene_length(scene)))
         self.axes = [self._orientation(body) for body in scene.body]

@@ -19,6 +19,7 @@ import numpy as np
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference import cache
 from crosscheck.judge.reference.bound import USEFUL, bounds, differences, rounding
+from crosscheck.judge.reference.hinges_of_balls import of_bodies, with_hinges
 from crosscheck.judge.reference.motion import OVER, Motion, Times
 from crosscheck.judge.reference.piecewise import motion_by
 from crosscheck.judge.reference.taylor import DATA, natural_motion
@@ -122,6 +123,11 @@ def runs(scene: Scene, times: np.ndarray, seconds: float) -> tuple[Motion, Motio
     If A runs out of time and B continues, as with stiff dampers, return the motion by B, by a second run of
     B, and by A.
     """
+    hinged = with_hinges(scene)
+    if hinged is not scene:
+        found = runs(hinged, times, seconds)
+        one, second_run, other = (of_bodies(each, len(scene.body), FIELDS) for each in found)
+        return one, second_run, other
     a = motion_by(natural_motion, scene, times, EXTENDED, seconds=SHARE * seconds)
     left, moved = seconds - a.seconds, max(DATA, a.contradiction) if a.contradiction > CONSISTENT else 0.0
     if a.reason == OVER:

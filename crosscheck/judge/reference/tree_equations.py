@@ -22,7 +22,7 @@ from crosscheck.judge.reference.tree_loads import Loads
 from crosscheck.judge.reference.vectors import apply, product, saddle_solve, unit
 from crosscheck.judge.time_functions import values
 from crosscheck.judge.tolerances import RANK
-from mbref.scene import Scene, refuse_rolling
+from mbref.scene import Scene, refuse_rolling, refuse_turned
 from mbref.scene.joints import ANGLE, DISPLACEMENT
 
 COORDINATES = (ANGLE, DISPLACEMENT)
@@ -53,6 +53,7 @@ class TreeEquations:
 
     def __init__(self, scene: Scene, arithmetic: Arithmetic, way: tuple[int, float] = (0, 0.0)):
         refuse_rolling(scene, "equations on a spanning tree")
+        refuse_turned(scene, "equations on a spanning tree")
         self.scene, self.arithmetic, self.tree = scene, arithmetic, Tree(scene, arithmetic)
         self.closures = Closures(self.tree)
         away = [key for key in sorted(used_coordinates(scene)) if key[1] not in self.tree.coordinate]

@@ -106,10 +106,12 @@ def closed_form(scene: Scene) -> Truth | None:
     """Return the truth of a scene of a known family, or None. The truth is cached with the part of the motion
     that is already solved.
 
-    No known family has couplings, intervals, armatures, rolling wheels, tables, loads over time or, except
-    torsion springs, loads of joints.
+    No known family has couplings, intervals, armatures, rolling wheels, tables, driven orientations, loads
+    over time or, except torsion springs, loads of joints.
     """
-    varies = any(load.over_time for load in scene.load) or any(ends(driver) for driver in scene.driver)
+    varies = any(load.over_time for load in scene.load) or any(
+        ends(driver) or driver.turn for driver in scene.driver
+    )
     pushed = any(isinstance(load, JointLoad) and not isinstance(load, TorsionSpring) for load in scene.load)
     others = varies or pushed or scene.coupling or has_pieces(scene) or rolling_wheel(scene)
     if others or any(joint.reflected_inertia for joint in scene.joint):

@@ -33,7 +33,7 @@ from mbref.method import SERIES_METHOD, Method, default_method
 from mbref.motions.motion import Motion
 from mbref.motions.outputs import UNIT_OF, quantity_of
 from mbref.motions.trajectory import Outcome
-from mbref.scene import Scene, intermittent, refuse_rolling
+from mbref.scene import Scene, intermittent, refuse_rolling, refuse_turned
 from mbref.scenes import find_scene
 from mbref.simulation.simulate import SAMPLES, checked_times
 from mbref.stepping.limits import FINEST, Limits
@@ -179,6 +179,7 @@ class DerivativeRequest:
         _refuse(scene, of, labels)
         self.scene, self.of, self.labels = scene, of or (), tuple(labels or ())
         refuse_rolling(scene, "derivatives")
+        refuse_turned(scene, "derivatives")
         self.model = Model(assembled(scene))
         if self.model.m > MOST_ROWS:
             count = f"{scene.name}: {self.model.m} constraint rows"

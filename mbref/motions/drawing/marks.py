@@ -192,10 +192,11 @@ def driver_mark(stage: Stage, driver: Driver) -> str:
     """Return a curved arrow about, or an arrow along, the axis of a driven joint, in the direction of its
     initial motion."""
     joint = stage.scene.joint_named(driver.joint)
-    axis, point = rotations.unit(joint.directions[0]), joint.anchor_pair[1]
-    rate = driver.polynomial[1] if len(driver.polynomial) > 1 else 0.0
+    main, point = driver.turn[0] if driver.turn else driver, joint.anchor_pair[1]
+    axis = rotations.unit(driver.turn[0].axis if driver.turn else joint.directions[0])
+    rate = main.polynomial[1] if len(main.polynomial) > 1 else 0.0
     sense = -1.0 if rate < 0 else 1.0
-    if joint.facts.driven == "angle":
+    if joint.facts.driven != "displacement":
         sign = _turning(stage, axis * sense, 15.0)
     else:
         sign = _arrow_from_origin(stage, axis * sense)

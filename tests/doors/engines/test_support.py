@@ -19,7 +19,7 @@ from crosscheck.judge.gauss_principle import gauss, stacked
 from crosscheck.judge.reference.taylor import natural_motion
 from mbref.motions.trajectory import Outcome
 from mbref.scene import Joint, Load, Scene, Universal
-from mbref.scene.validation import DRIVABLE
+from mbref.scene.driver_faults import DRIVABLE
 from mbref.scenes import SCENES
 from tests.helpers.measured import MARGIN, ROUNDING
 

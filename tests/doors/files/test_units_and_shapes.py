@@ -104,7 +104,7 @@ def test_every_number_may_have_a_unit_except_directions_and_pure_numbers():
     }
     along = {"axis", "axes", "normal", "along"}
     axes = {f"{joint.__name__}.{field}" for joint in JOINT_TYPES.values() for field in along}
-    pure = {"Body.orientation", "Driver.along", "Factor.polynomial", "Stop.restitution"}
+    pure = {"Body.orientation", "Driver.along", "Turn.axis", "Factor.polynomial", "Stop.restitution"}
     assert fields - axes == pure
 
 
