@@ -15,6 +15,7 @@ from mbref.equations.model import displaced
 from mbref.formulations import FORMULATIONS
 from mbref.kernels.layout import NOT_CONVERGED, SINGULAR
 from mbref.linear_algebra.least_norm import null_space
+from mbref.scene.scene import functions_of
 from mbref.scene.structure import without_series
 from mbref.simulation.runs import passes_with, trial_of
 from mbref.stepping.loop import (
@@ -81,8 +82,11 @@ def _of_branch(run: Run) -> str:
     neither = (
         f"neither {' nor '.join(passes)} lets" if len(passes) > 1 else f"{next(iter(passes))} does not let"
     )
-    end = ": end it before this time" if run.memory.loop.clock.time > 0.0 else ""
-    return f"{neither} the motion go on{end}"
+    time = run.memory.loop.clock.time
+    end = ": end it before this time" if time > 0.0 else ""
+    rows = {row[0] for function in functions_of(run.scene) for row in function.table or ()}
+    move = ", or move the row of a table that is at this time" if time in rows and time > 0.0 else ""
+    return f"{neither} the motion go on{end}{move}"
 
 
 def _follows(run: Run) -> str:

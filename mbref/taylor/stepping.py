@@ -38,6 +38,9 @@ from mbref.taylor.turning import begin_turns, follow_turns, turning_speed
 ROW_ROUNDING = 1e-12  # violation of a row, in units of the scene, that rounding may leave
 LOST_ROWS = 100.0  # violation of rows at the end of a step, relative to the tolerance
 LOST_MOTION = 30.0  # error of accelerations times the square of the step, relative to tolerance × order²
+# error of accelerations by rounding at the start of a step, relative to squared speed / length
+ROUGH_START = 1e-4
+ROUGH_BEFORE = 1e-7  # before a singular position, where the step that crosses it increases the error
 MOTION_ROUNDING = 1e-9  # error by rounding, relative to accelerations times the square of the step
 
 
@@ -86,6 +89,14 @@ def error_of_motion(h, memory):
         off = larger(off, (2.0 * terms[2, i] - state[2, i]) * h * h)
         size = larger(size, state[2, i] * h * h)
     return off, size
+
+
+@kernel
+def starts_rough(memory):
+    """Return whether rounding makes the accelerations rough at the end of a step, where the next one has to
+    start: they change by the velocity squared times the rounding of the rows over the pivot cubed."""
+    pivot, limit = least_pivot(memory), ROUGH_START if memory.step.crossed else ROUGH_BEFORE
+    return limit * pivot * pivot * pivot < VIOLATION_FLOOR
 
 
 @kernel
@@ -163,12 +174,14 @@ def take_step(memory):
         clock.attempt_end = clock.time + h
         return SINGULAR_AHEAD
     while True:
-        last = is_last(h, stop, memory)
+        ends, last = h >= left, is_last(h, stop, memory)
         status = expand_at(h, last, memory)
         if status == OK:
-            status = judge_step(h, last, memory)
-        # a run that ends deep needs a step as long as one that crosses: shorter ones start in rounding
-        if status == OK and (state.crossed or h <= regular or (last and ends_deep(memory))):
+            status = judge_step(h, ends, memory)
+        if status == UNDECIDED and ends and not last and ends_deep(memory):
+            status = STEP_TOO_SMALL  # shorter steps have the samples before
+        # an end that is deep needs a step as long as one that crosses: shorter ones start in rounding
+        if status == OK and (state.crossed or h <= regular or (ends and ends_deep(memory))):
             break
         if status == SINGULAR_AHEAD or (status == UNDECIDED and (state.crossed or h <= regular)):
             clock.attempt_end = clock.time + h
@@ -179,10 +192,11 @@ def take_step(memory):
         memory.kernels.return_to_start(memory)
         if not h >= memory.run.control.smallest_step:
             return status
+    is_rough = ends and stop < memory.progress.end and starts_rough(memory)
     end_step(h, stop, memory)
     put_angles(h, memory)
     counts.crossings += count_crossings(h, memory) if state.crossed else 0
-    return begin_pieces(stop, memory)
+    return UNDECIDED if is_rough else begin_pieces(stop, memory)
 
 
 @kernel
