@@ -17,7 +17,7 @@ place=$(mktemp -d)
 trap 'rm -rf "$place"' EXIT
 python3 -m venv "$place/environment"
 python="$place/environment/bin/python"
-"$python" -m pip install -q exudyn==1.13.6 numpy
+"$python" -m pip install -q exudyn==1.13.6 numpy scipy
 
 cat > "$place/proof.py" <<'END'
 import exudyn as exu

@@ -94,7 +94,8 @@ class Finding:
     source.
 
     The engine has the error if the number that the proof measures, in ``unit``, exceeds ``wrong_above``.
-    ``measured`` was the number at ``version`` of ``package``; without it, rounding decides the number. If
+    ``measured`` was the number at ``version`` of ``package``; without it, rounding decides the number.
+    ``needs`` are packages that ``script`` needs besides ``package`` and NumPy. If
     ``crashes`` is set, the engine's process ended at that version, and no proof is stored. ``when`` has
     conditions under which users hear of the finding at their own model (`at_model`).
     """
@@ -110,6 +111,7 @@ class Finding:
     measured: float = math.nan
     wrong_above: float = math.inf
     script: str = ""
+    needs: Sequence[str] = ()
     crashes: bool = False
     scene: str = ""
     family: str = ""

@@ -36,7 +36,14 @@ def _fields(found: Finding) -> Mapping[str, str]:
     else:
         most = DIFFERENT * abs(found.measured)
         stated, holds = f"{found.measured:g}", f"abs(seen - {found.measured!r}) <= {most:g}"
-    names = {"name": found.name, "package": found.package, "version": found.version, "unit": found.unit}
+    packages = " ".join([f"{found.package}=={found.version}", "numpy", *found.needs])
+    names = {
+        "packages": packages,
+        "name": found.name,
+        "package": found.package,
+        "version": found.version,
+        "unit": found.unit,
+    }
     return {**names, "words": words, "script": found.script.strip(), "stated": stated, "holds": holds}
 
 

@@ -13,7 +13,7 @@ place=$(mktemp -d)
 trap 'rm -rf "$place"' EXIT
 python3 -m venv "$place/environment"
 python="$place/environment/bin/python"
-"$python" -m pip install -q {package}=={version} numpy
+"$python" -m pip install -q {packages}
 
 cat > "$place/proof.py" <<'END'
 {script}
