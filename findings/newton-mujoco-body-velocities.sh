@@ -16,7 +16,7 @@ place=$(mktemp -d)
 trap 'rm -rf "$place"' EXIT
 python3 -m venv "$place/environment"
 python="$place/environment/bin/python"
-"$python" -m pip install -q newton==1.8.0 numpy
+"$python" -m pip install -q newton==1.8.0 numpy mujoco==3.17.0 mujoco-warp==3.17.0
 
 cat > "$place/proof.py" <<'END'
 import newton
