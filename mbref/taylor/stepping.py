@@ -192,11 +192,10 @@ def take_step(memory):
         memory.kernels.return_to_start(memory)
         if not h >= memory.run.control.smallest_step:
             return status
-    is_rough = ends and stop < memory.progress.end and starts_rough(memory)
     end_step(h, stop, memory)
     put_angles(h, memory)
     counts.crossings += count_crossings(h, memory) if state.crossed else 0
-    return UNDECIDED if is_rough else begin_pieces(stop, memory)
+    return begin_pieces(stop, memory)
 
 
 @kernel
@@ -218,7 +217,7 @@ def begin_pieces(stop, memory):
     t = memory.run.loop.clock.time
     if t < stop or t >= memory.progress.end:
         return OK
-    return memory.kernels.expand(t, memory)
+    return UNDECIDED if starts_rough(memory) else memory.kernels.expand(t, memory)
 
 
 @kernel
