@@ -100,7 +100,7 @@ def at_samples(trajectory: Trajectory, chosen: np.ndarray) -> Trajectory:
     }
     tables: dict[str, Any] = {
         key: values and {name: rows[chosen] for name, rows in values.items()}
-        for key in ("reactions", "angles")
+        for key in ("reactions", "open_reactions", "angles")
         for values in [getattr(trajectory, key)]
     }
     return replace(trajectory, **arrays, **tables)

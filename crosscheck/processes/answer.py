@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Engine, Setting
+from crosscheck.judge.events import at_samples
 from crosscheck.judge.metrics import in_scene_order
 from crosscheck.refusals import shortened
 from mbref.motions.trajectory import Cost, Outcome, Trajectory
@@ -81,10 +82,8 @@ def _finite(run: Trajectory) -> Trajectory:
     k = int(is_finite.argmin())
     body = run.bodies[int(np.isfinite(samples[k]).all(axis=1).argmin())]
     message = f"the engine completed, but the motion of {body} is not finite at {run.times[k]:.6g} s"
-    arrays = {n: a[:k] for n in (*WIDTHS, *OPTIONAL, "times") if (a := getattr(run, n)) is not None}
-    reactions = run.reactions and {name: wrench[:k] for name, wrench in run.reactions.items()}
-    reached: dict[str, Any] = {**arrays, "reactions": reactions, "t_end": float(run.times[max(k - 1, 0)])}
-    return replace(run, outcome=Outcome.NOT_FINITE, message=message, **reached)
+    t_end = float(run.times[max(k - 1, 0)])
+    return replace(at_samples(run, np.arange(k)), outcome=Outcome.NOT_FINITE, message=message, t_end=t_end)
 
 
 def answered(simulator: Engine, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:

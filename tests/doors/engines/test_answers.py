@@ -72,8 +72,10 @@ def test_bodies_of_an_answer_are_put_into_the_scene_s_order():
 def test_a_run_that_completed_with_numbers_that_are_not_finite_has_failed(name: str):
     good = FAKE.run(SCENE, TIMES, Setting("a"))
     bad = np.where(TIMES[:, None, None] < 0.2, getattr(good, name), np.nan)
-    run = well_formed(replace(good, **{name: bad}), SCENE, TIMES)
+    turns = {"angles": {"A": TIMES}, "open_reactions": {"A": TIMES}}
+    run = well_formed(replace(good, **turns | {name: bad}), SCENE, TIMES)
     assert (run.outcome, run.t_end, run.times.tolist()) == (Outcome.NOT_FINITE, 0.1, [0.0, 0.1])
+    assert [len(rows["A"]) for rows in (run.angles, run.open_reactions)] == [2, 2]
     assert "motion of block is not finite at 0.3 s" in run.message
 
 
