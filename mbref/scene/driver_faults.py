@@ -70,7 +70,7 @@ def driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
         for k, turn in enumerate(turns):
             yield from turn_faults(f"driver[{i}].turn[{k}]", turn)
             yield from table_faults(f"driver[{i}].turn[{k}].table", turn, data, 0.0, math.inf)
-        if turns and any(comes_and_goes(data)):
+        if turns and comes_and_goes(data):
             yield f"driver[{i}].turn", "needs a scene without intervals, conditions and end stops"
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from mbref.scene.fields import field_of
 from mbref.scene.function_faults import QUANTITY_OF, Faults, listed
 from mbref.scene.joints import JOINT_TYPES
+from mbref.scene.references import entries, text_of
 from mbref.scene.units import fits
 
 COMES_AND_GOES = {"active": "intervals", "when": "a condition", "release": "a release"}  # field → its meaning
@@ -16,30 +17,23 @@ NEED_A_HOLDING_JOINT = "armature", "stop"  # fields of a joint
 ALL_ROTATIONS = 3  # rotations that a joint with a single point leaves free
 
 
-def comes_and_goes(data: Mapping[str, Any]) -> Iterator[bool]:
-    """Yield for each joint and coupling whether it has intervals, a condition, or an end stop."""
-    for key in ("joint", "coupling"):
-        for entry in listed(data.get(key, ())):
-            yield any(field_of(entry, field) is not None for field in (*COMES_AND_GOES, "stop"))
-
-
-def _text(entry: Any, key: str) -> str:
-    """Return a name or type of an entry; empty if it is no text, which its field reports."""
-    found = field_of(entry, key)
-    return found if isinstance(found, str) else ""
+def comes_and_goes(data: Mapping[str, Any]) -> bool:
+    """Return whether a joint or coupling has intervals, a condition, or an end stop."""
+    constraints = [*entries(data, "joint"), *entries(data, "coupling")]
+    return any(_sometimes(entry, (*COMES_AND_GOES, "stop")) for entry in constraints)
 
 
 def _stop_faults(data: Mapping[str, Any], joints: list[Any]) -> Faults:
     """Yield end stops of driven coordinates, and their ends in other units than the coordinate's."""
-    driven = {_text(driver, "joint") for driver in listed(data.get("driver", ()))}
+    driven = {text_of(driver, "joint") for driver in entries(data, "driver")}
     for i, joint in enumerate(joints):
         if not (stop := field_of(joint, "stop")):
             continue
-        kind = _text(joint, "type")
+        kind = text_of(joint, "type")
         coordinate = JOINT_TYPES[kind].facts.driven if kind in JOINT_TYPES else None
         if coordinate is None:
             continue
-        if _text(joint, "name") in driven - {""}:
+        if text_of(joint, "name") in driven - {""}:
             yield f"joint[{i}].stop", "needs a joint without a driver, which prescribes the coordinate"
         for end in ("lower", "upper"):
             if not fits(value := field_of(stop, end), QUANTITY_OF[coordinate]):
@@ -53,10 +47,10 @@ def _sometimes(entry: Any, fields: Iterable[str] = COMES_AND_GOES) -> bool:
 
 def interval_faults(data: Mapping[str, Any]) -> Faults:
     """Yield the entries that need a joint that always holds, and fields that need intervals or conditions."""
-    joints = listed(data.get("joint", ()))
-    passing = {_text(joint, "name") for joint in joints if _sometimes(joint)}
+    joints = entries(data, "joint")
+    passing = {text_of(joint, "name") for joint in joints if _sometimes(joint)}
     for key in ("joint", "coupling"):
-        for i, entry in enumerate(listed(data.get(key, ()))):
+        for i, entry in enumerate(entries(data, key)):
             yield from _holding_faults(f"{key}[{i}]", entry, NEED_A_HOLDING_JOINT if key == "joint" else ())
     yield from _stop_faults(data, joints)
     for path, given in _users(data) if passing else ():
@@ -85,10 +79,10 @@ def _holding_faults(path: str, entry: Any, needing: Iterable[str]) -> Faults:
 def _users(data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Yield the path and the names of the joints on whose coordinates an entry acts."""
     for key, field in (("coupling", "joints"), ("driver", "joint"), ("load", "joint")):
-        for i, entry in enumerate(listed(data.get(key, ()))):
+        for i, entry in enumerate(entries(data, key)):
             yield f"{key}[{i}].{field}", field_of(entry, field)
     for key in ("joint", "coupling"):
-        for i, entry in enumerate(listed(data.get(key, ()))):
+        for i, entry in enumerate(entries(data, key)):
             yield f"{key}[{i}].when.joint", field_of(field_of(entry, "when"), "joint")
 
 
@@ -109,7 +103,7 @@ def condition_faults(path: str, entry: Any, types: Mapping[str, str]) -> Faults:
             yield f"{path}.release", "needs a force or a moment" + ", not both" * all(given)
         if path.startswith("coupling") and field_of(release, "joint") is None:
             yield f"{path}.release.joint", "is required, a joint whose reaction releases the coupling"
-        by = _text(release, "joint") or _text(entry, "name")
+        by = text_of(release, "joint") or text_of(entry, "name")
         kind = types.get(by, "")
         if given[1] and kind in JOINT_TYPES and JOINT_TYPES[kind].facts.free_rotations == ALL_ROTATIONS:
             yield f"{path}.release.moment", f"{by!r} is {kind}, whose moment is always zero"
@@ -127,7 +121,7 @@ def _watched_faults(path: str, when: Any, types: Mapping[str, str]) -> Faults:
     kind = types.get(name) if isinstance(name, str) else None
     if kind not in JOINT_TYPES or not (known := JOINT_TYPES[kind].facts.coordinates):
         return  # reported as a fault of the joint's name
-    chosen = JOINT_TYPES[kind].facts.main if coordinate is None else _text(when, "coordinate")
+    chosen = JOINT_TYPES[kind].facts.main if coordinate is None else text_of(when, "coordinate")
     if chosen in QUANTITY_OF and chosen not in known:
         yield f"{path}.coordinate", f"{name!r} is {kind}, which has no {chosen}"
     elif chosen in QUANTITY_OF and not fits(reaches, QUANTITY_OF[chosen]):
