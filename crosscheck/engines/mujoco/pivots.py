@@ -10,7 +10,7 @@ from crosscheck.engines.shared.initial_velocities import twist_maps
 from crosscheck.engines.shared.spanning_tree import Tree, spanning_tree
 from mbref.scene import Scene
 
-LEAST = 1e-15  # kg or kg m², mjMINVAL of MuJoCo 3 and 4
+LEAST_INERTIA = 1e-15  # kg or kg m²: mjMINVAL, also the least mass and moment of a body that MuJoCo reads
 
 
 def refusal(scene: Scene) -> Cannot | None:
@@ -18,14 +18,14 @@ def refusal(scene: Scene) -> Cannot | None:
     if not scene.has_mass():
         return None
     tree = spanning_tree(scene)
-    if all(min(link.mass, np.linalg.eigvalsh(link.inertia)[0]) > LEAST for link in tree.links):
+    if all(min(link.mass, np.linalg.eigvalsh(link.inertia)[0]) > LEAST_INERTIA for link in tree.links):
         return None  # a pivot is at least the inertia of its own link
-    small = np.flatnonzero(_pivots(scene, tree) < LEAST)
+    small = np.flatnonzero(_pivots(scene, tree) < LEAST_INERTIA)
     if not small.size:
         return None
     body = tree.links[int(np.searchsorted(tree.starts, small[-1], side="right")) - 1].body
     of = f"body {scene.body[body].name!r}" if body >= 0 else "the rod of a distance joint"
-    limit = f"below {LEAST:g} kg or kg m², for which MuJoCo takes {LEAST:g}"
+    limit = f"below {LEAST_INERTIA:g} kg or kg m², for which MuJoCo takes {LEAST_INERTIA:g}"
     return Cannot(Owner.ENGINE, f"a coordinate of {of} moves an inertia {limit}")
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from crosscheck.engines.mujoco import dampers
 from crosscheck.engines.mujoco.model import COUPLING, POWERS, description
+from crosscheck.engines.mujoco.pivots import LEAST_INERTIA
 from crosscheck.engines.shared.spanning_tree import FREE, Link, Tree, spanning_tree
 from crosscheck.refusals import MOST_COUPLED
 from mbref import rotations
@@ -35,7 +36,6 @@ from mbref.scene import (
 CONSTANT = (Moment, Force)  # loads that MJCF cannot describe
 DAMPERS = (RotationalDamper, PointDamper)  # which MJCF describes for some joints
 RESERVED = ("world",)  # names that a body of MJCF cannot have
-LEAST_INERTIA = 1e-15  # kg, kg m²: mjMINVAL, the least mass and moment of a moving body that MuJoCo reads
 KEYFRAME = "loads"  # with the control values of motors that stand for forces and torques of joints
 
 
