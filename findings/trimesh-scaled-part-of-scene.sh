@@ -4,7 +4,7 @@
 # Does: moment_inertia, volume and center_mass of a Scene count a part with a scale in its transformation wrongly: a
 #   box of 1, 2 and 3 m, which the scene shows twice as large, has 1.6 kg m² about x at 1 kg/m³, a quarter of the
 #   unscaled box's.
-# Right: 208 kg m², as scene.to_mesh() has, and a mass of 48 kg. extents and bounds of the scene are those of the
+# Right: 208 kg m², as scene.to_mesh() has, and a mass of 48 kg. The extents and bounds of the scene are those of the
 #   larger box.
 # Cause: The volume is the unscaled one, and the transformation of the tensor takes the scaled matrix for a rotation.
 #   glTF files have such scales.

@@ -26,7 +26,7 @@ def scripts(template: str) -> Mapping[str, str]:
     return {found.name: template.format(**_fields(found)) for found in findings() if found.script}
 
 
-def _fields(found: Finding) -> Mapping[str, str]:
+def _fields(found: Finding) -> Mapping[str, str | Finding]:
     said = f"Does: {found.does}", f"Right: {found.right}", f"Cause: {found.cause}"
     words = "\n".join(
         textwrap.fill(each, WIDTH, initial_indent="# ", subsequent_indent="#   ") for each in said
@@ -37,14 +37,7 @@ def _fields(found: Finding) -> Mapping[str, str]:
         most = DIFFERENT * abs(found.measured)
         stated, holds = f"{found.measured:g}", f"abs(seen - {found.measured!r}) <= {most:g}"
     packages = " ".join([f"{found.package}=={found.version}", "numpy", *found.needs])
-    names = {
-        "packages": packages,
-        "name": found.name,
-        "package": found.package,
-        "version": found.version,
-        "unit": found.unit,
-    }
-    return {**names, "words": words, "script": found.script.strip(), "stated": stated, "holds": holds}
+    return {"found": found, "packages": packages, "words": words, "stated": stated, "holds": holds}
 
 
 def _measured(found: Finding) -> str:

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Finding {name}: {package} {version}
+# Finding {found.name}: {found.package} {found.version}
 #
 {words}
 #
-# Stated: {stated} {unit}
+# Stated: {stated} {found.unit}
 #
 # This script installs the package in a temporary environment, runs the proof there, and compares the number that the
 # proof prints with the stated one. Exit status: 0 if it is as stated, 1 if it has changed. It needs Python 3.11 or
@@ -16,11 +16,10 @@ python="$place/environment/bin/python"
 "$python" -m pip install -q {packages}
 
 cat > "$place/proof.py" <<'END'
-{script}
-END
+{found.script}END
 cd "$place"
 seen=$("$python" proof.py | tail -n 1)
-echo "{package} {version}: stated {stated}, seen $seen {unit}"
+echo "{found.package} {found.version}: stated {stated}, seen $seen {found.unit}"
 "$python" -c 'import sys; seen = float(sys.argv[1]); sys.exit(not {holds})' "$seen" || {{
     echo "This has changed."
     exit 1

@@ -63,8 +63,8 @@ SHORTEST, MOVED = 1e-3, 1e-9  # s, and the correction of a state
 )
 def test_noise_in_the_shortest_step_is_stepped_over(noisy: float, moved: float, rtol: float) -> None:
     """y' is 1, but 1e9 at the state of the sixth stage of the first, shortest step, or at the state to which
-    this step is corrected: the change of slope by the correction counts as an error of the step. The lengths
-    of JUMPS are tried there, each counts as a rejected step, and no other step meets the noise. Each
+    this step is corrected: the change of slope by the correction counts as an error of the step. There
+    the integrator tries the lengths of JUMPS, each of which is a rejected step. No other step is noisy. Each
     correction adds ``moved`` to y, so that y(1) is 1 plus ``moved`` for each step, to rounding."""
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
