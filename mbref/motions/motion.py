@@ -22,7 +22,7 @@ from mbref.motions.joint_motion import JointMotion, joint_motion
 from mbref.motions.maxima import ReactionMaxima, reaction_maxima
 from mbref.motions.motor_motion import MotorMotion
 from mbref.motions.output_units import in_units
-from mbref.motions.outputs import all_columns, chosen
+from mbref.motions.outputs import all_columns, chosen_columns
 from mbref.motions.restart_with_events import restarted
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
@@ -195,8 +195,7 @@ class Motion(Trajectory):
         InputError
             If a name fits no column, or a unit is unknown.
         """
-        table = all_columns(self)
-        found = {name: table[name] for name in ["time", *chosen(table, names)]} if names else table
+        found = chosen_columns(self, names) if names else all_columns(self)
         return found if units is None else in_units(found, units)
 
     def reaction_maxima(self) -> dict[str, ReactionMaxima]:

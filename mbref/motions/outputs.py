@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, Literal, NamedTuple
 
@@ -171,8 +171,8 @@ def columns_of(owner: Owner, name: str, numbers: Mapping[str, Any]) -> Iterator[
 
 
 def all_columns(motion: Any, names: Sequence[str] = ()) -> dict[str, np.ndarray]:
-    """Return ``time`` and all columns (k,) of a Motion, by name; with ``names`` of columns, the columns of
-    their owners only."""
+    """Return ``time`` and all columns (k,) of a Motion, by name; with ``names`` of columns or their
+    beginnings, the columns of their owners only."""
     scene, table = motion.mechanism, {"time": motion.times}
     owners: dict[tuple[Owner, str], Callable[[], Any]] = {
         **{("body", name): partial(motion.__getitem__, name) for name in motion.bodies},
@@ -181,11 +181,23 @@ def all_columns(motion: Any, names: Sequence[str] = ()) -> dict[str, np.ndarray]
         **{("motor", name): partial(motion.motors.__getitem__, name) for name in motion.motors},
         **{("load", str(place)): partial(motion.load_at, place) for place in range(len(scene.load))},
     }
+    wanted = tuple(f"{name}." for name in names)
+    beginnings = {name[: k + 1] for name in wanted for k, letter in enumerate(name) if letter == "."}
     for (owner, name), find in owners.items():
-        if not names or any(column.startswith(PREFIXES[owner].format(name)) for column in names):
+        prefix = PREFIXES[owner].format(name)
+        if not names or prefix in beginnings or prefix.startswith(wanted):
             table.update(columns_of(owner, name, vars(find())))
     table.update(columns_of("mechanism", "", _totals(motion, names)))
     return table
+
+
+def chosen_columns(motion: Any, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Return ``time`` and the columns (k,) of a Motion with these names or beginnings; raises InputError as
+    ``chosen``. Columns of other owners, such as reactions of their joints, are not computed."""
+    table = all_columns(motion, names)
+    if not all(_fitting(table, name) for name in names):
+        table = all_columns(motion)  # the message lists the existing ones
+    return {name: table[name] for name in ["time", *chosen(table, names)]}
 
 
 def _totals(motion: Any, names: Sequence[str]) -> dict[str, np.ndarray | None]:
@@ -211,11 +223,14 @@ def chosen(columns: Mapping[str, Any] | Sequence[str], names: Sequence[str]) -> 
     """
     found: list[str] = []
     for name in names:
-        fitting = [column for column in columns if column == name or column.startswith(f"{name}.")]
-        if not fitting:
+        if not (fitting := _fitting(columns, name)):
             raise InputError(f"no column {name!r}{_hint(list(columns), name)}")
         found += [column for column in fitting if column not in found]
     return found
+
+
+def _fitting(columns: Iterable[str], name: str) -> list[str]:
+    return [column for column in columns if column == name or column.startswith(f"{name}.")]
 
 
 def quantity_of(column: str) -> str:

@@ -142,6 +142,16 @@ def test_unavailable_column_is_refused_with_its_need_or_a_suggestion(sprung):
             motion.columns(name)
 
 
+def test_columns_that_are_asked_alone_are_those_of_the_whole_table(sprung):
+    """Each name, and each beginning of one that ends before a dot, is asked alone."""
+    table = sprung.columns()
+    beginnings = {".".join(name.split(".")[:k]) for name in table for k in range(1, 4)}
+    for asked in sorted(beginnings - {"time"}):
+        wanted = {name for name in table if name == asked or name.startswith(f"{asked}.")} | {"time"}
+        found = sprung.columns(asked)
+        assert set(found) == wanted and all((found[name] == table[name]).all() for name in wanted), asked
+
+
 def test_driver_of_a_joint_that_is_not_driven_is_refused_with_the_driven_ones(sprung):
     """The pendulum has one joint, A, which is driven."""
     with pytest.raises(KeyError, match="no driver of a joint 'B'; driven joints: A"):
