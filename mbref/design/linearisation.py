@@ -166,7 +166,7 @@ class Tangent:
         if self.freedoms <= FEW_FREEDOMS or self.frame.rate or self.lightest <= LIGHT * MASSLESS:
             return None
         model, at_rest = self.model, state_at_rest(self.model, self.q, self.angles)
-        partition = partition_by(self.basis, unit_rows(self.terms.jacobian * model.units))
+        partition = partition_by(self.basis, unit_rows(self.terms.jacobian * model.units), model)
         rows = TangentRows(model, at_rest, partition)
         found = tangents_at(model, with_accelerations(at_rest, rows), rows, ()).a[0]
         own = found[:, : self.freedoms] / model.units[:, None] @ self.basis[partition.independent]

@@ -1,7 +1,7 @@
 """Tangents of the equations of motion: compiled solutions of their variations at many states.
 
-Displacements x and velocities w are in units S of the mechanism. The rows that a partition selects have unit
-length: their columns of the dependent displacements are D. A basis N of the freedoms satisfies Φ_q S N = 0.
+Displacements x and velocities w are in units S of the mechanism. ``row_factors`` has the partition of rows
+and displacements, the factors of D, and the basis N of the freedoms.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple
 
 from mbref.equations.evaluation import set_poses, set_velocities
 from mbref.equations.functions import select_pieces
+from mbref.equations.row_factors import RowPartition
 from mbref.equations.variation_layout import SceneChanges, VariedState
 from mbref.equations.varied_constraints import vary_constraints
 from mbref.equations.varied_forces import vary_forces
@@ -17,6 +18,7 @@ from mbref.equations.varied_vectors import set_world_changes, set_world_motion
 from mbref.kernels.compilation import INT, entry, kernel
 from mbref.kernels.layout import EQUATIONS
 from mbref.kernels.named_memory import Indices, Matrix, Named, Vector
+from mbref.linear_algebra.ordered_lu import solve_in_order, solve_transposed_in_order
 from mbref.linear_algebra.vectors import copy, larger
 
 
@@ -30,18 +32,14 @@ class StatesAndRows(NamedTuple):
     accelerations: Annotated[Matrix, "k", "n"]
     multipliers: Annotated[Matrix, "k", "m"]
     lengths: Annotated[Matrix, "k", "m"]  # of the rows
-    inverse: Annotated[Matrix, "k*r", "r"]  # D⁻¹
+    factors: Annotated[Matrix, "k", "factors"]  # of D
     basis: Annotated[Matrix, "k*n", "free"]  # N
     compliance: Annotated[Matrix, "k*free", "free"]  # (Nᵀ M N)⁻¹; without masses it is not read
 
 
-class PartitionAndUnits(NamedTuple):
-    """Independent rows, the displacements that they determine, and the independent displacements; S, and the
-    diagonal of S M S."""
+class UnitsAndMass(NamedTuple):
+    """S, and the diagonal of S M S."""
 
-    rows: Annotated[Indices, "r"]
-    dependent: Annotated[Indices, "r"]
-    independent: Annotated[Indices, "free"]
     units: Annotated[Vector, "n"]
     mass: Annotated[Vector, "n"]
     has_mass: Annotated[Indices, 1]
@@ -64,11 +62,11 @@ class TangentMemory(NamedTuple):
     """States, changes of the scene, tangents and working memory."""
 
     states: StatesAndRows
-    partition: PartitionAndUnits
+    partition: RowPartition
+    body: UnitsAndMass
     numbers: SceneChanges
     varied: VariedState
     found: TangentArrays
-    transposed: Annotated[Matrix, "r", "r"]  # D⁻ᵀ at a state
     part: Annotated[Vector, "r"]
     left: Annotated[Vector, "n"]
     along: Annotated[Matrix, 2, "free"]
@@ -93,23 +91,16 @@ def set_varied_state(k, memory, equations):
     varied.x[:] = 0.0
     varied.w[:] = 0.0
     varied.wrench[:] = 0.0
-    size = memory.transposed.shape[0]
-    for i in range(size):
-        for j in range(size):
-            memory.transposed[j, i] = states.inverse[size * k + i, j]
 
 
 @kernel
 def place_dependent(k, rows, target, memory):
     """Subtract from a vector (n,) x with Φ_q S x = ``rows`` (m,), zero at the independent displacements."""
     partition, part = memory.partition, memory.part
-    part[:] = 0.0
     for j in range(part.shape[0]):
         row = partition.rows[j]
-        value = rows[row] / memory.states.lengths[k, row]
-        if value != 0.0:
-            for i in range(part.shape[0]):
-                part[i] += memory.transposed[j, i] * value
+        part[j] = rows[row] / memory.states.lengths[k, row]
+    solve_in_order(memory.states.factors[k], part, partition.lu)
     for i in range(part.shape[0]):
         target[partition.dependent[i]] -= part[i]
 
@@ -128,9 +119,9 @@ def solve_for_accelerations(k, d, place, memory):
     """Compute δa and δλ along direction d from the changes of the equations at given a and λ."""
     partition, found, left, along = memory.partition, memory.found, memory.left, memory.along
     a, multipliers, n, f = found.a[place], found.multipliers[place], left.shape[0], along.shape[1]
-    units, mass, states = partition.units, partition.mass, memory.states
+    units, mass, states, part = memory.body.units, memory.body.mass, memory.states, memory.part
     place_dependent(k, memory.varied.rows[d], a, memory)
-    if partition.has_mass[0] == 1:
+    if memory.body.has_mass[0] == 1:
         along[:] = 0.0
         for i in range(n):
             left[i] = -memory.varied.wrench[d, i] * units[i] - mass[i] * a[i]
@@ -142,16 +133,13 @@ def solve_for_accelerations(k, d, place, memory):
         for i in range(n):
             left[i] += mass[i] * a[i]
         add_basis(k, along[1], a, memory)
-        size = memory.part.shape[0]
-        memory.part[:] = 0.0
-        for i in range(size):
+        for i in range(part.shape[0]):
             b = partition.dependent[i]
-            value = left[b] - mass[b] * a[b]
-            for j in range(size):
-                memory.part[j] += states.inverse[size * k + i, j] * value
-        for j in range(size):
+            part[i] = left[b] - mass[b] * a[b]
+        solve_transposed_in_order(states.factors[k], part, partition.lu)
+        for j in range(part.shape[0]):
             row = partition.rows[j]
-            multipliers[row] = memory.part[j] / states.lengths[k, row]
+            multipliers[row] = part[j] / states.lengths[k, row]
     for i in range(n):
         a[i] *= units[i]
 
@@ -179,7 +167,7 @@ def place_direction(k, d, level, freedoms, memory):
         for i in range(n):
             own[i] += memory.states.basis[n * k + i, column]
     for i in range(n):
-        target[i] = own[i] * memory.partition.units[i]
+        target[i] = own[i] * memory.body.units[i]
 
 
 @entry(INT(INT, TANGENTS, EQUATIONS))

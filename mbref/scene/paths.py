@@ -24,6 +24,27 @@ def replaced_at(fields: Mapping[str, Any], path: str, change: Callable[[Any], An
     return {**fields, first: _replaced(fields[first], rest, change, path)}
 
 
+def located_at(fields: Mapping[str, Any], path: str) -> tuple[Any, tuple[str | int, ...]]:
+    """Return the value of a scene at a path, and the fields and indices that lead to it, which are equal for
+    all paths to one number; rows of a periodic table count by their first period. Raises SceneError if the
+    path does not exist."""
+    first, *rest = _steps(fields, path)
+    value, steps, period = fields[first], [first], 0
+    for step in rest:
+        if isinstance(value, tuple):
+            place = _place(value, step, path)
+            value = value[place]
+            steps.append(place % period if period else place)
+            period = 0
+        else:
+            of = _fields_with(step, value, path)
+            periodic = step == "table" and of.get("periodic")
+            period = (of.get("period_rows") or len(of[step]) - 1) if periodic else 0
+            value = of[step]
+            steps.append(step)
+    return value, tuple(steps)
+
+
 def _steps(fields: Mapping[str, Any], path: str) -> list[str]:
     """Return the fields and entries along a path."""
     found = [name or entry for name, entry in PATH_STEP.findall(path)]
@@ -39,9 +60,7 @@ def _replaced(value: Any, steps: Sequence[str], change: Callable[[Any], Any], pa
     if isinstance(value, tuple):
         place = _place(value, step, path)
         return tuple(_replaced(v, rest, change, path) if i == place else v for i, v in enumerate(value))
-    fields = _fields_of(value)
-    if step not in fields:
-        raise SceneError([f"{path}: the scene has no {step!r} there{meant(step, fields)}"])
+    fields = _fields_with(step, value, path)
     if step == "table" and not rest and fields.get("period_rows"):
         return {**fields, step: change(fields[step]), "period_rows": None}  # another table has another period
     if step == "table" and rest and fields.get("periodic"):
@@ -78,10 +97,18 @@ def _fields_of(value: Any) -> Mapping[str, Any]:
     return dict(value) if isinstance(value, dict | SceneEntry) else {}
 
 
+def _fields_with(step: str, value: Any, path: str) -> Mapping[str, Any]:
+    """Return the fields of an entry; raises SceneError if the step of a path is none of them."""
+    fields = _fields_of(value)
+    if step not in fields:
+        raise SceneError([f"{path}: the scene has no {step!r} there{meant(step, fields)}"])
+    return fields
+
+
 def _place(entries: tuple[Any, ...], step: str, path: str) -> int:
     """Return the index for a step of a path: a number, or the name of the entry (for a driver its joint's
     name)."""
-    tables = [*map(_fields_of, entries)]
+    tables = [vars(e) if isinstance(e, SceneEntry) else _fields_of(e) for e in entries]
     names = [table.get("name") or table.get("joint") for table in tables]
     if step in names:
         return names.index(step)

@@ -20,13 +20,13 @@ from mbref.design.derivatives.sensitivities import (
 from mbref.design.derivatives.start_numbers import is_of_start
 from mbref.design.derivatives.states import Direction, States, refuse_abrupt_springs, state_at_rest
 from mbref.design.derivatives.tangents import (
-    RowPartition,
     TangentRows,
     partition_of,
     tangents_at,
     with_accelerations,
 )
 from mbref.equations.initial_state import consistent_start
+from mbref.equations.row_factors import RowPartition
 from mbref.input_error import InputError
 from mbref.scene import Scene
 from mbref.scenes import find_scene

@@ -10,12 +10,12 @@ from mbref.design.derivatives.panels import Gauss, tails
 from mbref.design.derivatives.states import States
 from mbref.design.derivatives.tangents import (
     MOST_ENTRIES,
-    RowPartition,
     TangentRows,
     partition_of,
     tangent_ranks,
 )
 from mbref.equations.model import Model
+from mbref.equations.row_factors import RowPartition
 from mbref.input_error import InputError
 from mbref.method import Method
 from mbref.motions.motion import Motion
@@ -28,8 +28,8 @@ RESOLVED = 1e-10
 RESOLVED_BASIS = 1e-8  # the same of displacements by the independent ones
 STEPS_OF_PANEL = 4  # steps of the run for each of the first panels, of which those too long are bisected
 MOST_PANELS = 20_000  # a limit of memory and time
-# largest norm of a basis / √f, and of an inverse / that where its partition was chosen
-LARGEST_BASIS, LARGEST_INVERSE = 10.0, 10.0
+# largest norm of a basis / √f; of an inverse, and smallest pivot, each / that where its partition was chosen
+LARGEST_BASIS, LARGEST_INVERSE, SMALLEST_PIVOT = 10.0, 10.0, 0.01
 
 
 @dataclass(frozen=True)
@@ -163,17 +163,18 @@ def _partitions(
     count = len(states.times) // points
     found: list[RowPartition] = []
     used, rough = np.full(count, -1), np.zeros(count, dtype=bool)
-    size = max(1, MOST_ENTRIES // max(1, points * model.n * (model.m + model.n)))
+    size = max(1, MOST_ENTRIES // max(1, points * (model.entry_columns.size + model.n * (freedoms + 1))))
     while (left := np.flatnonzero((used < 0) & ~rough)).size:
         middle = states.at([left[0] * points + points // 2])
         partition = partition_of(model, middle)
         if len(partition.independent) != freedoms:
             raise InputError(f"the motion passes a singular position near t = {middle.times[0]:.6g} s")
-        largest = LARGEST_INVERSE * np.linalg.norm(TangentRows(model, middle, partition).inverse)
+        chosen = TangentRows(model, middle, partition)
         for panels in (left[k : k + size] for k in range(0, left.size, size)):
             at = (panels[:, None] * points + np.arange(points)).ravel()
             rows = TangentRows(model, states.at(at), partition)
-            fits = np.linalg.norm(rows.inverse, axis=(1, 2)) <= largest
+            fits = rows.inverse_sizes <= LARGEST_INVERSE * chosen.inverse_sizes
+            fits &= (rows.pivots >= SMALLEST_PIVOT * chosen.pivots).all(axis=1)
             fits &= np.linalg.norm(rows.basis, axis=(1, 2)) <= LARGEST_BASIS * np.sqrt(freedoms)
             fits = fits.reshape(-1, points).all(axis=1)
             used[panels[fits]] = len(found)

@@ -6,7 +6,7 @@ import re
 from typing import Any
 
 from mbref.scene import Scene, SceneError
-from mbref.scene.paths import replaced_at
+from mbref.scene.paths import located_at
 
 UNITS = {  # by field
     **dict.fromkeys(("mass",), "kg"),
@@ -47,16 +47,6 @@ def number_at(scene: Scene, path: str) -> float:
     return float(value)
 
 
-def is_same_number(scene: Scene, path: str, other: str) -> bool:
-    """Return whether two paths lead to one number of a scene; raises SceneError if one does not exist."""
-    mark = object()
-    found: list[Any] = []
-    replaced_at(replaced_at(dict(scene), path, lambda _: mark), other, found.append)
-    return found[0] is mark
-
-
 def _at(scene: Scene, path: str) -> Any:
     """Return the entry or value of a scene at a path; raises SceneError if there is none."""
-    found: list[Any] = []
-    replaced_at(dict(scene), path, found.append)
-    return found[0]
+    return located_at(dict(scene), path)[0]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -20,7 +19,7 @@ from mbref.design.derivatives.numbers_of_scene import (
     scene_numbers,
 )
 from mbref.design.derivatives.panels import Precision, gauss
-from mbref.design.derivatives.paths_of_numbers import is_same_number, unit_of_number
+from mbref.design.derivatives.paths_of_numbers import unit_of_number
 from mbref.design.derivatives.result import Sensitivities
 from mbref.design.derivatives.start_numbers import StartNumber, is_of_start, start_number
 from mbref.design.derivatives.states import States, joined, refuse_abrupt_springs
@@ -34,6 +33,7 @@ from mbref.motions.motion import Motion
 from mbref.motions.outputs import UNIT_OF, quantity_of
 from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene, intermittent, refuse_rolling, refuse_turned
+from mbref.scene.paths import located_at
 from mbref.scenes import find_scene
 from mbref.simulation.simulate import SAMPLES, checked_times
 from mbref.stepping.limits import FINEST, Limits
@@ -45,7 +45,7 @@ RTOL = 1e-12  # default relative tolerance of the runs
 FINER = 0.1  # tolerance of the more accurate run / tolerance
 ORDER = 24  # order of the series of the more accurate run
 DIFFERENCE_ROUNDING = 2e-14  # error of a difference of order 8 / largest derivative over the samples
-MOST_ROWS = 400  # constraint rows, whose singular values are computed at every point
+MOST_ROWS = 1500  # constraint rows, whose singular values take seconds
 
 
 def sensitivities(
@@ -136,10 +136,12 @@ def _refuse_no_list(name: str, given: Sequence[str]) -> None:
 def refuse_repeats(scene: Scene, name: str, labels: Sequence[str]) -> None:
     """Raise InputError unless labels are a list, and for a number of the scene that is given twice."""
     _refuse_no_list(name, labels)
-    for label, other in itertools.combinations(labels, 2):
-        of_start = is_of_start(label) or is_of_start(other)
-        if label == other or (not of_start and is_same_number(scene, label, other)):
-            raise InputError(f"{name}: {label} and {other} are one number; give it once")
+    fields, found = dict(scene), {}
+    for label in labels:
+        place = (label,) if is_of_start(label) else located_at(fields, label)[1]
+        if place in found:
+            raise InputError(f"{name}: {found[place]} and {label} are one number; give it once")
+        found[place] = label
 
 
 class Derivatives(NamedTuple):

@@ -18,29 +18,23 @@ from mbref.design.derivatives.changes_of_scene import scene_changes
 from mbref.design.derivatives.numbers_of_scene import SceneNumber
 from mbref.design.derivatives.states import States, terms_along
 from mbref.equations.model import Model
+from mbref.equations.row_factors import FactorMemory, RowPartition, SolveMemory, factorise_rows, solve_rows
 from mbref.equations.tangent_solutions import (
-    PartitionAndUnits,
     StatesAndRows,
     TangentMemory,
+    UnitsAndMass,
     compute_tangents,
 )
 from mbref.equations.units import row_lengths, unit_rows
 from mbref.kernels.named_memory import allocate, packed
+from mbref.linear_algebra.ordered_lu import elimination_order, lu_pattern, places_in_factors
 
 MASSLESS = 1e-13  # mass along a freedom / largest one, below which nothing resists: it does not accelerate
 # share of a number's effect on the constraints that no displacement compensates; accurate rows leave less
 COMPENSATED = 1e-7
 NOISE = 1e-12  # rounding of Φ, lengths of the mechanism or rad
+PROBES = 4  # vectors of signs, whose products with D⁻¹ estimate its norm
 MOST_ENTRIES = 2_000_000  # numbers at states that are computed together: 16 MB
-
-
-class RowPartition(NamedTuple):
-    """Independent constraint rows (r,), dependent displacements (r,) that they determine, and independent
-    displacements (f,)."""
-
-    rows: np.ndarray
-    dependent: np.ndarray
-    independent: np.ndarray
 
 
 def partition_of(model: Model, state: States) -> RowPartition:
@@ -48,15 +42,38 @@ def partition_of(model: Model, state: States) -> RowPartition:
     rows = unit_rows(terms_along(model, state).jacobian[0] * model.units)
     _, values, right = np.linalg.svd(rows, full_matrices=True)
     rank = int(np.sum(values > TANGENT_RANK * values.max(initial=0.0)))
-    return partition_by(right[rank:].T, rows)
+    return partition_by(right[rank:].T, rows, model)
 
 
-def partition_by(free: np.ndarray, rows: np.ndarray) -> RowPartition:
-    """Return the partition of unit rows (m, n) and displacements, by pivots; ``free`` (n, f) spans the null
-    space of the rows."""
+def partition_by(free: np.ndarray, rows: np.ndarray, model: Model) -> RowPartition:
+    """Return the partition of unit rows (m, n) of a model and displacements, by pivots; ``free`` (n, f) spans
+    the null space of the rows."""
     independent = _pivots(free.T)
     dependent = np.setdiff1d(np.arange(len(free)), independent)
-    return RowPartition(_pivots(rows[:, dependent].T), dependent, independent)
+    chosen = _pivots(rows[:, dependent].T)
+    possible = np.zeros(rows.shape, dtype=bool)
+    row, entry = np.nonzero(model.entry_columns < model.n)
+    possible[row, column := model.entry_columns[row, entry]] = True
+    within = np.ix_(chosen, dependent)
+    orders = elimination_order(rows[within], possible[within])
+    chosen, dependent = chosen[orders[0]], dependent[orders[1]]
+    lu = lu_pattern(possible[np.ix_(chosen, dependent)])
+    place = row * model.entry_columns.shape[1] + entry
+    i, j = _places(chosen, len(rows))[row], _places(dependent, model.n)[column]
+    of_d, free_column = (i >= 0) & (j >= 0), _places(independent, model.n)[column]
+    of_c = np.flatnonzero((i >= 0) & (free_column >= 0))
+    of_c = of_c[np.argsort(free_column[of_c], kind="stable")]
+    starts = np.searchsorted(free_column[of_c], np.arange(len(independent) + 1))
+    of_factors = places_in_factors(lu, i[of_d], j[of_d])
+    parts = place[of_d], of_factors, place[of_c], i[of_c], starts
+    return RowPartition(chosen, dependent, independent, *parts, lu)
+
+
+def _places(chosen: np.ndarray, count: int) -> np.ndarray:
+    """Return the place (count,) of each index among the chosen ones, -1 for others."""
+    found = np.full(count, -1)
+    found[chosen] = np.arange(len(chosen))
+    return found
 
 
 def _pivots(matrix: np.ndarray) -> np.ndarray:
@@ -79,39 +96,57 @@ class TangentRows:
     def __init__(self, model: Model, states: States, partition: RowPartition):
         self.model, self.units, self.partition = model, model.units, partition
         self.terms = terms_along(model, states)
-        rows = self.terms.jacobian * model.units
-        self._lengths = row_lengths(rows)
-        self._unit = rows / self._lengths[..., None]
-        chosen = self._unit[:, partition.rows]
-        self.inverse = np.linalg.inv(chosen[..., partition.dependent])
-        self.basis = np.zeros((len(rows), model.n, len(partition.independent)))
-        self.basis[:, partition.dependent] = -self.inverse @ chosen[..., partition.independent]
-        self.basis[:, partition.independent] = np.eye(len(partition.independent))
+        count, units = len(states.times), np.append(model.units, np.zeros(6))  # the fixed frame does not move
+        entries = self.terms.blocks * units[model.entry_columns]
+        self._lengths = row_lengths(entries)
+        entries /= self._lengths[..., None]
+        sizes = {"k": count, "n": model.n, "r": len(partition.rows), "free": len(partition.independent)}
+        sizes |= {"factors": len(partition.lu.column), "entries": model.entry_columns.size, "probes": PROBES}
+        given = {"partition": partition, "entries": entries.reshape(count, -1)}
+        probes = np.random.default_rng(0).choice([-1.0, 1.0], (PROBES, sizes["r"]))
+        memory = allocate(FactorMemory, sizes, **given, probes=probes)
+        factorise_rows(packed(memory).argument)
+        self._factors, self._probed = memory.factors, memory.probed
+        self.basis = memory.basis.reshape(count, model.n, sizes["free"])
         self.mass = (self.terms.mass * model.units**2)[:, None]
 
-    def packed(self, states: States) -> dict[str, StatesAndRows | PartitionAndUnits]:
+    @property
+    def inverse_sizes(self) -> np.ndarray:
+        """Estimates (k,) of the Frobenius norm of D⁻¹, from its products with vectors of signs."""
+        products = self._probed.reshape(len(self.basis), -1)
+        return np.asarray(np.linalg.norm(products, axis=1) / np.sqrt(PROBES))
+
+    @property
+    def pivots(self) -> np.ndarray:
+        """Sizes (k, r) of the pivots of D."""
+        return np.abs(self._factors[:, self.partition.lu.diagonal])
+
+    def packed(self, states: States) -> dict[str, StatesAndRows | RowPartition | UnitsAndMass]:
         """Return the states, and these rows, as arrays of ``TangentMemory``."""
-        f, r = self.basis.shape[2], len(self.partition.rows)
-        compliance = np.zeros((len(states.times), f, f)) if self.model.kinematic else self._inverse_mass
-        count, n = self.basis.shape[:2]
-        arrays = (
-            self.inverse.reshape(count * r, r),
-            self.basis.reshape(count * n, f),
-            compliance.reshape(count * f, f),
-        )
+        count, n, f = self.basis.shape
+        compliance = np.zeros((count, f, f)) if self.model.kinematic else self._inverse_mass
         given = states.times, states.q, states.v, states.angles, states.a, states.multipliers, self._lengths
+        arrays = self._factors, self.basis.reshape(count * n, f), compliance.reshape(count * f, f)
         has_mass = np.array([not self.model.kinematic], dtype=np.int64)
-        own = *self.partition, self.units, self.mass[:, 0], has_mass
         return {
             "states": StatesAndRows(*map(np.ascontiguousarray, (*given, *arrays))),
-            "partition": PartitionAndUnits(*map(np.ascontiguousarray, own)),
+            "partition": self.partition,
+            "body": UnitsAndMass(self.units, np.ascontiguousarray(self.mass[:, 0]), has_mass),
         }
+
+    def _solved(self, rhs: np.ndarray, transposed: bool = False) -> np.ndarray:
+        """Return D⁻¹ or D⁻ᵀ times right-hand sides (k, r, c)."""
+        count, size, columns = rhs.shape
+        found = np.ascontiguousarray(rhs.mT).reshape(count * columns, size)
+        memory = SolveMemory(self.partition.lu, self._factors, found)
+        solve_rows(int(transposed), packed(memory).argument)
+        return found.reshape(count, columns, size).mT
 
     def placed(self, rhs: np.ndarray) -> np.ndarray:
         """Return x (k, n, c) with Φ_q S x = rhs (k, m, c), zero at the independent displacements."""
         x = np.zeros((len(rhs), self.model.n, rhs.shape[2]))
         unit = rhs / self._lengths[..., None]
-        x[:, self.partition.dependent] = self.inverse @ unit[:, self.partition.rows]
+        x[:, self.partition.dependent] = self._solved(unit[:, self.partition.rows])
         return x
 
     def solve(self, rhs: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -121,8 +156,8 @@ class TangentRows:
         multipliers = np.zeros_like(rhs)
         if not self.model.kinematic:
             a = a + self.basis @ (self._inverse_mass @ (self.basis.mT @ (pushed - self.mass * a)))
-            parts = self.inverse.mT @ (pushed - self.mass * a)[:, self.partition.dependent]
-            multipliers[:, self.partition.rows] = parts
+            left = (pushed - self.mass * a)[:, self.partition.dependent]
+            multipliers[:, self.partition.rows] = self._solved(left, transposed=True)
         return a * self.units[:, None], multipliers / self._lengths[..., None]
 
     @cached_property

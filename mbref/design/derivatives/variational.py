@@ -78,7 +78,7 @@ class VariationalEquations:
         """Yield the indices of states whose tangents are computed together, these states with accelerations,
         and their tangents by the partitions with indices ``used`` (k,)."""
         model, columns = self.model, 2 * self.freedoms + len(self.numbers)
-        entries = model.n * (model.m + model.n) + (3 * model.m + 4 * model.n) * columns
+        entries = model.entry_columns.size + (3 * model.m + 4 * model.n) * (columns + 1)
         size = max(1, MOST_ENTRIES // max(1, entries))
         for index, partition in enumerate(self.run.partitions):
             places = np.flatnonzero(used == index)
