@@ -1,6 +1,7 @@
 """Compile the kernels that the tests need, before them: python -m tests.kernels"""
 
 from crosscheck.engines.shared.compiled import run as integrators
+from mbref.equations.row_factors import factorise_rows, solve_rows
 from mbref.equations.tangent_solutions import compute_tangents
 from mbref.kernels.compilation import prepare_all
 from mbref.method import Method
@@ -25,7 +26,8 @@ def prepare(backwards: bool = False) -> None:
     """Compile or load kernels of METHODS and the series. Processes from both ends share the work."""
     general = dict.fromkeys(kernel for name in METHODS for kernel in kernels_of(Method.parse(name)))
     # rates_and_balance: runs by a sparse formulation with redundant rows, without projection
-    kernels = [*general, *kernels_of_series(), follow_drivers, rates_and_balance, compute_tangents]
+    tangents = [compute_tangents, factorise_rows, solve_rows]
+    kernels = [*general, *kernels_of_series(), follow_drivers, rates_and_balance, *tangents]
     prepare_all(kernels[::-1] if backwards else kernels)
 
 

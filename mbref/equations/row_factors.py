@@ -1,7 +1,7 @@
 """Factors of constraint rows at many states: independent rows, in units, determine dependent displacements.
 
 The rows that a partition selects have unit length in units S of displacements. Their columns of the dependent
-displacements are D, a sparse matrix, and those of the independent displacements are C.
+displacements are D, a sparse matrix, and their columns of the independent displacements are C.
 """
 
 from __future__ import annotations

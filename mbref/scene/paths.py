@@ -29,7 +29,8 @@ def located_at(fields: Mapping[str, Any], path: str) -> tuple[Any, tuple[str | i
     all paths to one number; rows of a periodic table count by their first period. Raises SceneError if the
     path does not exist."""
     first, *rest = _steps(fields, path)
-    value, steps, period = fields[first], [first], 0
+    steps: list[str | int] = [first]
+    value, period = fields[first], 0
     for step in rest:
         if isinstance(value, tuple):
             place = _place(value, step, path)

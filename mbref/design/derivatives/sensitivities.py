@@ -136,7 +136,8 @@ def _refuse_no_list(name: str, given: Sequence[str]) -> None:
 def refuse_repeats(scene: Scene, name: str, labels: Sequence[str]) -> None:
     """Raise InputError unless labels are a list, and for a number of the scene that is given twice."""
     _refuse_no_list(name, labels)
-    fields, found = dict(scene), {}
+    fields = dict(scene)
+    found: dict[tuple[str | int, ...], str] = {}
     for label in labels:
         place = (label,) if is_of_start(label) else located_at(fields, label)[1]
         if place in found:

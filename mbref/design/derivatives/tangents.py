@@ -27,13 +27,13 @@ from mbref.equations.tangent_solutions import (
 )
 from mbref.equations.units import row_lengths, unit_rows
 from mbref.kernels.named_memory import allocate, packed
-from mbref.linear_algebra.ordered_lu import elimination_order, lu_pattern, places_in_factors
+from mbref.linear_algebra.elimination_order import elimination_order, lu_pattern, places_in_factors
 
 MASSLESS = 1e-13  # mass along a freedom / largest one, below which nothing resists: it does not accelerate
 # share of a number's effect on the constraints that no displacement compensates; accurate rows leave less
 COMPENSATED = 1e-7
 NOISE = 1e-12  # rounding of Φ, lengths of the mechanism or rad
-PROBES = 4  # vectors of signs, whose products with D⁻¹ estimate its norm
+SIGN_VECTORS = 4  # vectors of signs, whose products with D⁻¹ estimate its norm
 MOST_ENTRIES = 2_000_000  # numbers at states that are computed together: 16 MB
 
 
@@ -101,9 +101,13 @@ class TangentRows:
         self._lengths = row_lengths(entries)
         entries /= self._lengths[..., None]
         sizes = {"k": count, "n": model.n, "r": len(partition.rows), "free": len(partition.independent)}
-        sizes |= {"factors": len(partition.lu.column), "entries": model.entry_columns.size, "probes": PROBES}
+        sizes |= {
+            "factors": len(partition.lu.column),
+            "entries": model.entry_columns.size,
+            "probes": SIGN_VECTORS,
+        }
         given = {"partition": partition, "entries": entries.reshape(count, -1)}
-        probes = np.random.default_rng(0).choice([-1.0, 1.0], (PROBES, sizes["r"]))
+        probes = np.random.default_rng(0).choice([-1.0, 1.0], (SIGN_VECTORS, sizes["r"]))
         memory = allocate(FactorMemory, sizes, **given, probes=probes)
         factorise_rows(packed(memory).argument)
         self._factors, self._probed = memory.factors, memory.probed
@@ -114,7 +118,7 @@ class TangentRows:
     def inverse_sizes(self) -> np.ndarray:
         """Estimates (k,) of the Frobenius norm of D⁻¹, from its products with vectors of signs."""
         products = self._probed.reshape(len(self.basis), -1)
-        return np.asarray(np.linalg.norm(products, axis=1) / np.sqrt(PROBES))
+        return np.asarray(np.linalg.norm(products, axis=1) / np.sqrt(SIGN_VECTORS))
 
     @property
     def pivots(self) -> np.ndarray:
