@@ -10,6 +10,7 @@ from mbref.stepping.preparation import kernels_of
 from mbref.taylor.driven import follow_drivers
 from mbref.taylor.preparation import kernels_of_series
 
+TANGENTS = (compute_tangents, factorise_rows, solve_rows)
 METHODS = (
     "alf-dual+projection",
     "mpi-svd+partitioning",
@@ -26,8 +27,7 @@ def prepare(backwards: bool = False) -> None:
     """Compile or load kernels of METHODS and the series. Processes from both ends share the work."""
     general = dict.fromkeys(kernel for name in METHODS for kernel in kernels_of(Method.parse(name)))
     # rates_and_balance: runs by a sparse formulation with redundant rows, without projection
-    tangents = [compute_tangents, factorise_rows, solve_rows]
-    kernels = [*general, *kernels_of_series(), follow_drivers, rates_and_balance, *tangents]
+    kernels = [*general, *kernels_of_series(), follow_drivers, rates_and_balance, *TANGENTS]
     prepare_all(kernels[::-1] if backwards else kernels)
 
 

@@ -343,14 +343,13 @@ def test_command_prints_and_writes_the_derivatives_of_the_function(tmp_path, cap
 
 
 def test_chain_of_ten_loops_obeys_eulers_identity_of_masses_and_moments_of_inertia():
-    """Energy is homogeneous of degree 1 in masses and moments of inertia, and an angle of degree 0: Σ p ∂E/∂p
-    = E and Σ p ∂φ/∂p = 0 over all 21 bodies. The constraints of the chain are redundant."""
+    """Energy is homogeneous of degree 1 in these numbers p of the 21 bodies: Σ p ∂E/∂p = E, Σ p ∂φ/∂p = 0."""
     scene = mbref.find_scene("four_bar_chain[10]")
     numbers = {f"body[{body.name}].mass": body.mass for body in scene.body}
     numbers |= {f"body[{body.name}].inertia.z": body.inertia[2] for body in scene.body}
     times, angle = [0.05, 0.1], f"{scene.joint[0].name}.angle"
     found = mbref.sensitivities(scene, ["kinetic_energy", angle], [*numbers], times)
-    total = found.values @ np.array([*numbers.values()])
+    energies, angles = (found.values @ np.array([*numbers.values()])).T
     motion = mbref.simulate(scene, times=times).columns("kinetic_energy", angle)
-    assert_close(total[:, 0], motion["kinetic_energy"])
-    assert np.abs(total[:, 1]).max() < ACCURATE * np.abs(motion[angle]).max()
+    assert_close(energies, motion["kinetic_energy"])
+    assert np.abs(angles).max() < ACCURATE * np.abs(motion[angle]).max()
