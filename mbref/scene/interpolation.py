@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -9,10 +10,12 @@ import numpy as np
 from mbref.scene.functions import FEWEST_ROWS, TimeFunction
 from mbref.scene.scene import Scene
 
-# By halving the intervals the error of a spline's value falls to 1/16, of its second derivative to 1/4
-OF_VALUE, OF_SECOND = 1 / 15, 1 / 3  # error / difference of both splines
+# By halving the intervals the error of a smooth function's spline falls to 1/16, of its second derivative
+# to 1/4; the error of a spline over kinks and jumps falls to 1/2 at best
+SMOOTH_FALL, SECOND_FALL, LEAST_FALL = 16.0, 4.0, 2.0
 LEAST_SHOWN = 1e-9  # error / largest value, below which it is rounding
 BETWEEN_ROWS = 8  # points between two rows
+COMPARED_SPLINES = 3  # splines that are compared: through all rows, every second and every fourth one
 
 
 def interpolation_notes(scene: Scene) -> Iterator[str]:
@@ -43,18 +46,32 @@ def _note(name: str, function: TimeFunction, derivative: int, unit: str, what: s
 def interpolation_error(function: TimeFunction, derivative: int = 0) -> tuple[float, float]:
     """Return the estimated error of a table's spline, or of its second derivative, and the largest value.
 
-    NaN if the table has too few rows for a spline through every second one.
+    The error is d / (f - 1), with the difference d to the spline through every second row. Of values, f is
+    the difference between the splines through every second and every fourth row over d, from 2 to 16. NaN if
+    the table has too few rows for a spline through every second one.
     """
+    assert function.table is not None
+    table = np.array(function.table)
+    levels = [table]
+    while (
+        len(levels) < COMPARED_SPLINES and len(coarse := np.r_[levels[-1][:-1:2], table[-1:]]) >= FEWEST_ROWS
+    ):
+        levels.append(coarse)
+    if len(levels) == 1:
+        return np.nan, np.nan
+    t = np.unique(np.linspace(table[:-1, 0], table[1:, 0], BETWEEN_ROWS))
+    found = [_spline(rows, function.periodic, derivative, t) for rows in levels]
+    largest = float(np.abs(found[0]).max())
+    differences = [float(np.abs(a - b).max()) for a, b in itertools.pairwise(found)]
+    if derivative or not differences[0]:
+        return differences[0] / (SECOND_FALL - 1.0), largest
+    fall = (differences[1:] or [largest])[0] / differences[0]  # with few rows, from no table to half the rows
+    return differences[0] / (min(max(fall, LEAST_FALL), SMOOTH_FALL) - 1.0), largest
+
+
+def _spline(rows: np.ndarray, periodic: bool, derivative: int, t: np.ndarray) -> np.ndarray:
+    """Return the spline through rows (k, 2) of a table, or a derivative of it, at times t (s)."""
     from scipy.interpolate import CubicSpline  # only scenes with tables need it
 
-    assert function.table is not None
-    times, values = np.array(function.table).T
-    kept = np.r_[np.arange(0, len(times) - 1, 2), len(times) - 1]
-    if len(kept) < FEWEST_ROWS:
-        return np.nan, np.nan
-    ends = "periodic" if function.periodic else "not-a-knot"
-    fine, coarse = (CubicSpline(times[rows], values[rows], bc_type=ends) for rows in (slice(None), kept))
-    t = np.unique(np.linspace(times[:-1], times[1:], BETWEEN_ROWS))
-    found = fine(t, derivative)
-    share = OF_SECOND if derivative else OF_VALUE
-    return share * float(np.abs(found - coarse(t, derivative)).max()), float(np.abs(found).max())
+    ends = "periodic" if periodic else "not-a-knot"
+    return np.asarray(CubicSpline(*rows.T, bc_type=ends)(t, derivative))

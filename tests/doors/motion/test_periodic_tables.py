@@ -109,6 +109,19 @@ def test_stated_error_of_interpolation_is_right_to_a_factor_of_three(rows, perio
     assert error / 3 < estimate < 3 * error and largest == pytest.approx(0.3 * 4 * np.pi**2, rel=0.3)
 
 
+@pytest.mark.parametrize("rows", [6, 21, 41, 101])
+def test_stated_error_between_rows_with_plateaus_is_right_to_a_factor_of_three(rows):
+    """The law of straight lines through six rows; the spline through these rows alone errs by 3.4 of 7."""
+    corners, fine = (
+        ((0.0, 0.15, 0.2, 0.3, 0.4, 0.5), (0.0, 0.0, 2.0, 2.0, 7.0, 7.0)),
+        np.linspace(0, 0.5, 9001),
+    )
+    times = corners[0] if rows == 6 else np.linspace(0.0, 0.5, rows)
+    table = list(zip(times, np.interp(times, *corners), strict=True))
+    error = np.abs(CubicSpline(*np.array(table).T)(fine) - np.interp(fine, *corners)).max()
+    assert error / 3 < interpolation_error(Driver(joint="J", table=table))[0] < 3 * error
+
+
 @pytest.mark.parametrize("periodic", [True, False])
 def test_run_notes_the_error_of_interpolation_and_proposes_a_periodic_table(periodic, tmp_path, capsys):
     """A periodic spline is more accurate, so that it is proposed for a table that begins and ends alike."""
