@@ -91,7 +91,7 @@ class Event:
         if self.jumps and sizes:
             name = max(sizes, key=lambda each: sizes[each])
             parts.append(f"largest impulse {sizes[name]:.6g} N s in joint {name}")
-        if any(self.open.values()):
+        if self.jumps and any(self.open.values()):
             parts.append("redundant constraints leave impulses open, the least are given")
         return "; ".join(parts)
 
