@@ -165,8 +165,10 @@ class Structure:
 
     @functools.cached_property
     def closed_loops(self) -> int:
-        """Number of independent loops of bodies and joints; without a loop no position is singular."""
-        nearer, loops = list(range(self.nb + 1)), 0  # a body nearer to the representative of its tree
+        """Number of independent loops of bodies and joints, with one for all polynomial couplings; without a
+        loop no position is singular."""
+        loops = int(self.places.powers > 0)
+        nearer = list(range(self.nb + 1))  # a body nearer to the representative of its tree
 
         def representative(body: int) -> int:
             while nearer[body] != body:

@@ -24,7 +24,7 @@ from mbref.scene import Scene
 from mbref.scene.structure import bushings, without_series
 from mbref.simulation import VERSION
 from mbref.simulation.advice import advice_on_rounding, remedy
-from mbref.simulation.end_positions import REDUNDANT_ROWS, Met, is_at_dead_position, is_near, met_by
+from mbref.simulation.end_positions import BEYOND, REDUNDANT_ROWS, Met, is_at_dead_position, is_near, met_by
 from mbref.simulation.runs import trial_of
 from mbref.simulation.wheels import lying_wheel
 from mbref.stepping.leaving import begins_at_rest, fits_no_branch, leaving_acceleration
@@ -177,7 +177,7 @@ def _met(run: Run, met: Met) -> str:
     """Return one sentence on the singular position at which a run ended."""
     where = LOSE_RANK.format(", ".join(map(repr, met.joints))) if met.joints else ""
     trial = trial_of(run)
-    able = trial.completed or trial.reached > met.time if trial else not without_series(run.scene)
+    able = trial.completed or trial.reached > BEYOND * met.time if trial else not without_series(run.scene)
     return SINGULAR_POSITION.format(met.time, where, run.method.stabilisation.name, ", taylor does" * able)
 
 

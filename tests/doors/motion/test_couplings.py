@@ -174,14 +174,8 @@ PAIR_FAULTS = [
     ({"joints": ["A"]}, "joints: must be two or more names of joints, got ['A']"),
     ({"polynomial": [1.0, 2.0]}, "polynomial: or ratio, not both"),
     ({"ratio": None, "polynomial": [1.0, 0.0]}, "polynomial: must not end with 0, which has no influence"),
-    (
-        {"ratio": None, "polynomial": [1.0, "2 m"]},
-        "polynomial[1]: is in rad/rad^2, got '2 m'",
-    ),
-    (
-        {"ratio": None, "polynomial": [1] * 10},
-        f"polynomial: must be {AT_MOST_NINE}",
-    ),
+    ({"ratio": None, "polynomial": [1.0, "2 m"]}, "polynomial[1]: is in rad/rad^2, got '2 m'"),
+    ({"ratio": None, "polynomial": [1] * 10}, f"polynomial: must be {AT_MOST_NINE}"),
     ({"ratoi": 1.0}, "ratoi: is not a known field; did you mean 'ratio'?"),
 ]
 SUM = {"name": "gears", "joints": ["A", "B", "C"], "ratios": RATIOS.tolist()}

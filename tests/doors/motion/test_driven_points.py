@@ -99,10 +99,7 @@ def test_driver_of_a_point_is_a_driver_of_a_free_joint(tmp_path, capsys):
         ({"body": "ground"}, "driver[tip].body: a point of the ground cannot be driven"),
         ({"name": "O"}, "driver[O].name: 'O' is already the name of a joint"),
         ({"joint": "O"}, "driver[tip].joint: or a driven point, not both; got name, too"),
-        (
-            {"polynomial": [0.0, "1 rad/s"]},
-            "driver[tip].polynomial[1]: prescribes the displacement of a free",
-        ),
+        ({"polynomial": [0.0, "1 rad/s"]}, "driver[tip].polynomial[1]: prescribes the displacement of a"),
     ],
 )
 def test_faulty_drivers_of_points_are_refused_with_their_field(change, fault):

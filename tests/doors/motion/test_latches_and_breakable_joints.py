@@ -238,15 +238,9 @@ MOTOR = {"type": "revolute", "axis": [0, 0, 1], "armature": 1.0, "active": [[0.1
         ({"when": {"reaches": 1.0}}, "joint[L].when: needs a joint, or bodies and points"),
         ({"when": {"bodies": ["one", "two"], "reaches": 1.0}}, "joint[L].when.points: is required for a dis"),
         ({"release": {"force": 1.0, "moment": 1.0}}, "joint[L].release: needs a force or a moment, not both"),
-        (
-            {"type": "spherical", "release": {"moment": 1.0}},
-            "release.moment: 'L' is spherical, whose moment is",
-        ),
+        ({"type": "spherical", "release": {"moment": 1.0}}, "release.moment: 'L' is spherical, whose moment"),
         ({"release": {"force": 1.0}, "holds_at_start": False}, "holds_at_start: lets it never hold"),
-        (
-            {"holds_at_start": True},
-            "joint[L].holds_at_start: is of a constraint with active, when or release",
-        ),
+        ({"holds_at_start": True}, "joint[L].holds_at_start: is of a constraint with active, when or"),
         ({"active": [[0.3, 0.1]]}, IN_ORDER),
         ({"active": [[0.1, 0.3], [0.3, 0.4]]}, IN_ORDER),
         ({"active": [0.1, 0.3]}, "joint[L].active[0]: must be a begin and an end (s), got 0.1"),
