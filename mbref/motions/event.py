@@ -12,6 +12,8 @@ from mbref.motions.record_fields import typed
 
 STATE_BEFORE = ("position", "orientation", "velocity", "angular_velocity")
 NAME_LISTS = ("engaged", "released", "stops", "contacts", "chatter")
+# impulse of force / impulse of moment, 1/m, below which it is rounding
+ROUNDED_IMPULSE = 1e-12
 EVENT_STATES = (*STATE_BEFORE, "velocity_after", "angular_velocity_after")
 
 
@@ -87,10 +89,17 @@ class Event:
             lost = self.energy_before - self.energy_after
             change = f"{lost:.6g} J lost" if lost >= 0.0 else f"{-lost:.6g} J supplied by drivers"
             parts.append(f"kinetic energy {self.energy_before:.6g} J → {self.energy_after:.6g} J, {change}")
-        sizes = {name: float(np.linalg.norm(wrench[:3])) for name, wrench in self.impulses.items()}
-        if self.jumps and sizes:
-            name = max(sizes, key=lambda each: sizes[each])
-            parts.append(f"largest impulse {sizes[name]:.6g} N s in joint {name}")
+        if self.jumps and self.impulses:
+            sizes = {
+                unit: {
+                    name: float(np.linalg.norm(wrench[k : k + 3])) for name, wrench in self.impulses.items()
+                }
+                for unit, k in (("N s", 0), ("N m s", 3))
+            }
+            force, moment = (max(each.values()) for each in sizes.values())
+            unit = "N s" if force > ROUNDED_IMPULSE * moment else "N m s"
+            name = max(sizes[unit], key=lambda each: sizes[unit][each])
+            parts.append(f"largest impulse {sizes[unit][name]:.6g} {unit} in joint {name}")
         if self.jumps and any(self.open.values()):
             parts.append("redundant constraints leave impulses open, the least are given")
         return "; ".join(parts)

@@ -181,14 +181,15 @@ def test_linkage_that_locks_at_an_angle_becomes_a_truss_at_rest():
 
 def test_clutch_that_cannot_carry_its_load_lets_go_at_once():
     """Braked by 3 N m / 0.3 kg m² = 10 rad/s², rotor A reaches 6 t - 5 t² = 1 rad at 0.2 s with 4 rad/s. The
-    clutch, of ratio 1/2, adds (1/2)² 0.3 kg m² of rotor B: A has 4 · 0.3 / 0.375 = 3.2 rad/s, B half. It
-    would then brake B by 3 / 0.375 / 2 = 4 rad/s² with 1.2 N m, more than its limit, 1 N m."""
+    clutch, of ratio 1/2, adds (1/2)² 0.3 kg m² of rotor B: A has 4 · 0.3 / 0.375 = 3.2 rad/s, B half, by 0.48
+    N m s. It would then brake B by 3 / 0.375 / 2 = 4 rad/s² with 1.2 N m, more than its limit, 1 N m."""
     when, release = {"joint": "A", "reaches": "1 rad"}, {"joint": "B", "moment": 1.0}
     coupling = [{"name": "clutch", "joints": ["A", "B"], "ratio": 0.5, "when": when, "release": release}]
     brake = {"type": "joint_torque", "joint": "A", "torque": -3.0}
     scene = rotors().with_(coupling=coupling, load=[brake])
     motion = mbref.simulate(scene, "taylor", times=[0.0, 0.4], rtol=1e-13)
     assert [event.engaged for event in motion.events] == [("clutch",), ()]
+    assert "largest impulse 0.48 N m s in joint B" in motion.events[0].sentence
     assert all(abs(event.time - 0.2) <= ROUNDED for event in motion.events)
     assert np.abs(motion.angular_velocity[-1, :, 2] - [3.2 - 10.0 * 0.2, 1.6]).max() <= ROUNDED
 
