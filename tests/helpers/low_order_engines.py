@@ -81,7 +81,7 @@ def low_order(step: Step, fault: str = "", parts: tuple[int, ...] = PARTS) -> En
     def with_fixed_steps(model, start, times, longest):
         y, t, states, count = start, 0.0, [], 0
         for sample in times:
-            n = int(np.ceil((sample - t) / longest - 1e-9))
+            n = int(np.ceil((sample - t) / longest))
             for k in range(n):
                 y = step(model.rates, t + k * (sample - t) / n, y, (sample - t) / n, model.count)
             t, count = sample, count + n

@@ -49,6 +49,12 @@ def test_explicit_euler_feeds_energy_into_a_tumbling_body_and_symplectic_euler_d
     assert suite.verdict_on("passive", bench).status == status
 
 
+def test_similar_copy_takes_as_many_steps_although_the_engine_rounds_their_number_up():
+    crank = next(each.scene for each in specimens() if each.scene.name == "whirling crank")
+    bench = trial.set_up(InProcess(low_order(euler, parts=(50, 100))), Specimen(crank, keeps="energy"))
+    assert suite.verdict_on("similar", bench).status == suite.PASS
+
+
 class Jointless(Falling):
     """Maps no joints, and has no settings for a mechanism that it refuses."""
 
