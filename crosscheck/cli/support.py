@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from crosscheck.conformance.mechanisms.closed_forms import armature_pendulum, gear_pair, rack, screw
+from crosscheck.conformance.mechanisms.coupled import coupled_probes, driven_ball, event_probes, wheel
 from crosscheck.conformance.mechanisms.features import feature_scenes, massless_link, undetermined
 from crosscheck.engine import BUILT_IN, LARGE, OPTIONAL, Cannot, engine
 from mbref.scene import Scene
@@ -54,7 +55,12 @@ def of_features(engines: Sequence[str], ask: Ask | None = None) -> Support:
         "coupling of angles": gear_pair()[0],
         "coupling of an angle and a displacement": rack()[0],
         "coupling within a joint": screw()[0],
+        "coupling of three coordinates": coupled_probes()["sum of coordinates"],
+        "polynomial coupling": coupled_probes()["cam in motion"],
         "armature": armature_pendulum()[0],
+        **event_probes(),
+        "driven orientation": driven_ball(),
+        "wheel": wheel(),
         "massless link": massless_link(),
         "motion without masses": undetermined(),
     }

@@ -1,11 +1,26 @@
-"""Two bodies in motion, on joints that couplings relate, or with an event: a stop, a latch, an interval."""
+"""Two bodies in motion, on joints that couplings relate, with an event (a stop, a latch, an interval), or
+with a ball joint that a driver turns; a wheel."""
 
 from __future__ import annotations
 
 from crosscheck.conformance.changes.copies import replaced
 from crosscheck.conformance.mechanisms.features import JOINTS
-from crosscheck.conformance.mechanisms.moving import BALL, BODY, HINGE, HUB, between, launched
-from mbref.scene import Coupling, Distance, Scene
+from crosscheck.conformance.mechanisms.moving import (
+    BALL,
+    BODY,
+    DURATION,
+    GRAVITY,
+    HINGE,
+    HUB,
+    between,
+    launched,
+)
+from mbref.scene import Body, Coupling, Distance, Driver, Rolling, Scene, Turn
+
+TURNS = (
+    Turn(axis=(0.3, -0.4, 1.0), polynomial=(0.0, 0.8, -0.5)),
+    Turn(axis=(1.0, 0.2, 0.0), sine={"amplitude": 0.3, "frequency": 6.0}),
+)
 
 
 def coupled_probes() -> dict[str, Scene]:
@@ -30,6 +45,21 @@ def coupled_probes() -> dict[str, Scene]:
             "sum", (HUB, BODY), (HINGE, between(JOINTS["cylindrical"])), couplings=(total,)
         ),
     }
+
+
+def driven_ball() -> Scene:
+    """Return a body on a ball joint, whose driver turns it about two axes; a hinge carries both."""
+    moving = launched("driven ball", (HUB, BODY), (HINGE, BALL), drivers=(Driver(joint="J", turn=TURNS),))
+    hub, body = moving.body  # the driver determines the motion of the body relative to the hub
+    return moving.with_(body=(hub, replaced(body, velocity=None, angular_velocity=None)))
+
+
+def wheel() -> Scene:
+    """Return a leaning disc that rolls down a plane without slip."""
+    body = Body(name="disc", mass=1.5, inertia=(0.02, 0.01, 0.01), position=(0.0, 0.0, 0.2))
+    anchor, axis, normal = body.position, (1.0, 0.2, 0.3), (0.0, 0.1, 1.0)
+    floor = Rolling(name="J", bodies=("ground", "disc"), anchor=anchor, axis=axis, normal=normal, radius=0.2)
+    return Scene(name="wheel", gravity=GRAVITY, duration=DURATION, body=(body,), joint=(floor,))
 
 
 def event_probes() -> dict[str, Scene]:

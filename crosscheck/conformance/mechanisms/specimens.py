@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from crosscheck.conformance.mechanisms.closed_forms import CLOSED_FORMS, GEARED, Exact
-from crosscheck.conformance.mechanisms.coupled import coupled_probes, event_probes
+from crosscheck.conformance.mechanisms.coupled import coupled_probes, driven_ball, event_probes
 from crosscheck.conformance.mechanisms.features import feature_scenes
 from crosscheck.conformance.mechanisms.invariant import flying_ring, whirling_crank
 from crosscheck.conformance.mechanisms.large_graphs import large_graph
@@ -61,6 +61,7 @@ def specimens(deep: bool = False) -> tuple[Specimen, ...]:
     forms += [Specimen(scene, None, deep or scene.name in RELATED) for scene in scenes]
     geared = [Specimen(*make()) for make in GEARED]
     geared += [Specimen(s.with_(name=n)) for n, s in (coupled_probes() | event_probes()).items()]
+    geared.append(Specimen(driven_ball()))
     graphs = (Specimen(large_graph(seed), large=True) for seed in GRAPHS)
     invariant = (Specimen(flying_ring(40.0), keeps="momenta"), Specimen(whirling_crank(), keeps="energy"))
     return (*forms, *geared, Specimen(dead_end(), dead_end=True), *graphs, *invariant)

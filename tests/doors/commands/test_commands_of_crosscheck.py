@@ -116,10 +116,7 @@ def test_json_of_two_scenes_is_a_list_in_their_order(capsys, tmp_path):
         (["--setting", "noisi"], "did you mean 'noisy'?"),
         (["--engine", "mujco"], "did you mean 'mujoco'?"),
         (["--engine", FAKE, "--setting", "plain", "--option", "secs=1"], "plain has no option 'secs'"),
-        (
-            ["--setting", "plain", *("--option", "seconds=1") * 2],
-            "--option: seconds is given twice; give it once",
-        ),
+        (["--setting", "plain", *("--option", "seconds=1") * 2], "--option: seconds is given twice; give it"),
         (["--engine", "ode"], "unknown engine 'ode'; known: mbref, mujoco, pinocchio, exudyn"),
         (["--engine", "no_such_module:ENGINE"], "engine 'no_such_module:ENGINE' cannot be loaded"),
     ],

@@ -141,10 +141,7 @@ def test_samples_that_would_fill_the_memory_are_refused_with_the_largest_number(
 @pytest.mark.parametrize(
     ("wanted", "said"),
     [
-        (
-            {"samples": 10**20},
-            "--samples: at least 2 and at most 5000000 for the 1 bodies of resting, got 10",
-        ),
+        ({"samples": 10**20}, "at least 2 and at most 5000000 for the 1 bodies of resting, got 10"),
         ({"samples": 1}, "--samples: at least 2 and at most 5000000 for the 1 bodies of resting, got 1$"),
         ({"time_limit": 1e30}, r"--time-limit: must be positive and at most 1e\+07 s, got 1e\+30"),
         ({"time_limit": -1.0}, r"--time-limit: must be positive and at most 1e\+07 s, got -1"),

@@ -57,10 +57,7 @@ def loop(tmp_path) -> str:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "scene", "words"),
-    [
-        *((n, pinned(), w) for n, w in FOUND.items()),
-        *((n, SPATIAL[0].make(), w) for n, w in WHIRLING.items()),
-    ],
+    [*((n, pinned(), FOUND[n]) for n in FOUND), *((n, SPATIAL[0].make(), WHIRLING[n]) for n in WHIRLING)],
     ids=[*FOUND, *WHIRLING],
 )
 def test_each_faulty_gradient_of_the_zoo_is_found_with_its_cause(name, scene, words):

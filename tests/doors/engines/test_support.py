@@ -25,7 +25,7 @@ from tests.helpers.measured import MARGIN, ROUNDING
 
 
 def test_probes_have_every_type_of_joint_load_and_driver():
-    """The scene format's classes declare the types. Wheels, which only mbref simulates, have no probe."""
+    """The scene format's classes declare the types. One row of the table is of wheels."""
 
     def kinds(union) -> set[str]:
         return {kind.model_fields["type"].default for kind in union.__args__[0].__args__}
@@ -34,6 +34,8 @@ def test_probes_have_every_type_of_joint_load_and_driver():
     assert set(LOADS) == kinds(Load), set(LOADS) ^ kinds(Load)
     scenes = feature_scenes()
     assert {f"{kind} driver" for kind in DRIVABLE} <= set(scenes), list(scenes)
+    wheel, ball = (support.of_features(BUILT_IN).answers[row] for row in ("wheel", "driven orientation"))
+    assert all((found["mbref"] is None) and found["mujoco"] for found in (wheel, ball))
 
 
 @pytest.mark.parametrize(("name", "is_redundant"), [("loop", False), ("redundant loop", True)])
@@ -83,28 +85,18 @@ def test_engines_that_map_massless_links_move_them_as_a_universal_joint(name):
 
 
 def test_unsupported_feature_gets_a_numbered_note_with_its_cause():
-    """Engine "b" lacks every joint: "– 1" in its column, and note 1 names the joint and who lacks it."""
+    """Engines "b" and "c" lack every joint: "– 1" in their columns. Note 1 names both, and the joint."""
 
     def ask(name: str, scene: Scene) -> Cannot | None:
-        return Cannot(Owner.ENGINE, f"no {scene.joint[0].type}") if name == "b" and scene.joint else None
-
-    found = support.of_features(["a", "b"], ask)
-    notes = found.notes()
-    assert found.row("free body", notes) == ["✓", "✓"], found.row("free body", notes)
-    assert found.row("fixed joint", notes) == ["✓", "– 1"], found.row("fixed joint", notes)
-    assert notes[0] == "b: no fixed (missing in the engine)", notes
-    assert len(notes) == len(set(notes)), notes
-
-
-def test_engines_with_one_cause_share_a_note():
-    """The adapters of b and c refuse every scene for one reason: one note names both."""
-
-    def ask(name: str, scene: Scene) -> Cannot | None:
-        return None if name == "a" else Cannot(Owner.ADAPTER, "load[0]: no map")
+        lacks = name != "a" and scene.joint
+        return Cannot(Owner.ENGINE, f"no {scene.joint[0].type}") if lacks else None
 
     found = support.of_features(["a", "b", "c"], ask)
-    assert found.notes() == ["b, c: load[0]: no map (missing in the adapter)"], found.notes()
-    assert found.row("loop", found.notes()) == ["✓", "– 1", "– 1"], found.row("loop", found.notes())
+    notes = found.notes()
+    assert found.row("free body", notes) == ["✓"] * 3, found.row("free body", notes)
+    assert found.row("fixed joint", notes) == ["✓", "– 1", "– 1"], found.row("fixed joint", notes)
+    assert notes[0] == "b, c: no fixed (missing in the engine)", notes
+    assert len(notes) == len(set(notes)), notes
 
 
 def test_every_built_in_engine_refuses_motion_without_masses():

@@ -198,10 +198,7 @@ def test_sdf_without_a_moving_body_is_refused(model, says, tmp_path):
 @pytest.mark.parametrize(
     ("beside", "says"),
     [
-        (
-            "<world name='v'><gravity>0 0 -1</gravity><model name='n'/></world>",
-            "has world 'v' beside world 'w'",
-        ),
+        ("<world name='v'><gravity>0 0 -1</gravity><model name='n'/></world>", "world 'v' beside world 'w'"),
         ("<model name='n'><link name='c'/></model>", "has model 'n' beside world 'w'"),
     ],
 )
