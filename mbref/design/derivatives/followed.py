@@ -28,8 +28,9 @@ RESOLVED = 1e-10
 RESOLVED_BASIS = 1e-8  # the same of displacements by the independent ones
 STEPS_OF_PANEL = 4  # steps of the run for each of the first panels, of which those too long are bisected
 MOST_PANELS = 20_000  # a limit of memory and time
-# largest norm of a basis / √f; of an inverse, and smallest pivot, each / that where its partition was chosen
-LARGEST_BASIS, LARGEST_INVERSE, SMALLEST_PIVOT = 10.0, 10.0, 0.01
+# largest displacement by an independent one; norm of an inverse, and smallest pivot, each / that where its
+# partition was chosen
+LARGEST_BASIS, LARGEST_INVERSE, SMALLEST_PIVOT = 5.0, 10.0, 0.01
 
 
 @dataclass(frozen=True)
@@ -175,7 +176,7 @@ def _partitions(
             rows = TangentRows(model, states.at(at), partition)
             fits = rows.inverse_sizes <= LARGEST_INVERSE * chosen.inverse_sizes
             fits &= (rows.pivots >= SMALLEST_PIVOT * chosen.pivots).all(axis=1)
-            fits &= np.linalg.norm(rows.basis, axis=(1, 2)) <= LARGEST_BASIS * np.sqrt(freedoms)
+            fits &= np.abs(rows.basis).max(axis=(1, 2), initial=0.0) <= LARGEST_BASIS
             fits = fits.reshape(-1, points).all(axis=1)
             used[panels[fits]] = len(found)
             if rule and freedoms:
