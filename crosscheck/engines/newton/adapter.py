@@ -23,16 +23,20 @@ from mbref.scene import Scene
 JOINTS = ("fixed", "revolute", "universal", "spherical", "translational", "cylindrical")
 # types of joints that close a loop; by default all
 CLOSES = {solvers.MUJOCO: ("spherical", "revolute", "fixed")}
-OPTIONS = STEP | {"alpha": "fraction of a joint error that a step of Kamino removes"}
+OPTIONS = STEP | {
+    "alpha": "fraction of a joint error that a step of Kamino removes",
+    "solver": "of Kamino: padmm, dvi or lox",
+    "integrator": "of Kamino: euler or moreau",
+    "sparse": "whether Kamino's Jacobian is sparse; by default that of DVI and LOX",
+    "penalty": "penalty of PADMM; 1 by default",
+    "tolerance": "joint error, m or rad, at which LOX ends",
+    "iterations": "largest number of iterations of PADMM or LOX",
+}
 DEFAULT_STEPS = {solvers.DEFAULTS: 1e-3}
 
 
 class Newton(SteppingEngine):
-    """Newton (PyPI ``newton``).
-
-    It declares no ``alternatives``: a first step of Kamino gains 0.2 % to 111 % of acceleration times
-    step, by solver and integrator, and later steps the right amount.
-    """
+    """Newton (PyPI ``newton``)."""
 
     name = "newton"
     package = "newton"
@@ -45,6 +49,7 @@ class Newton(SteppingEngine):
     rounding = 2.0**-23
     families, options = solvers.FAMILIES, OPTIONS
     own_steps, default_steps = solvers.OWN_STEPS, DEFAULT_STEPS
+    alternatives = solvers.ALTERNATIVES
     finer, most_steps = 1, 10_000  # a step takes 0.01 to 100 ms of CPU time
 
     def prepare(self, families: Sequence[str]) -> None:
