@@ -21,7 +21,7 @@ TIME_LIMIT = 0.5  # s of CPU time of a run, so that all runs take a quarter of a
 LONGEST = 0.5  # s of a motion
 FAMILIES = {
     "mujoco": ("stock", "euler", "implicit", "implicitfast", "discrete"),
-    "pinocchio": ("baumgarte", "lcaba", "admm", "pgs", "impulses"),
+    "pinocchio": ("baumgarte", "lcaba", "admm", "pgs", "impulses", "impulses, pgs", "compliant"),
 }
 ROWS = tuple(
     row._replace(time_limit=TIME_LIMIT) for row in ladders.ROWS if row.family in FAMILIES.get(row.engine, ())

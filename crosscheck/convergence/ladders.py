@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
@@ -28,6 +28,7 @@ SLOW = 10.0  # s of CPU time of a run of a family whose step takes 0.1 s
 MOST_TIME = 120.0  # s of CPU time of a run with the compilation of its model
 HALVINGS = 16  # number of runs of a family at most
 VAIN = 2  # number of successive runs without a lower error after which finer ones are not made
+VANISHING = {"compliance": 2}  # options that vanish with the step, and the power of the step
 LOWER = 0.7  # of the least error so far: a method of order one halves the error with the step
 
 MECHANISMS = (
@@ -72,6 +73,8 @@ ROWS = (
     Row("pinocchio", "admm", "RK4 with the anchors of Pinocchio 4 and its ADMM, Baumgarte terms"),
     Row("pinocchio", "pgs", "RK4 with the anchors of Pinocchio 4 and its PGS, Baumgarte terms"),
     Row("pinocchio", "impulses", "impulses of its ADMM (order 1), closure errors removed in a step"),
+    Row("pinocchio", "impulses, pgs", "impulses of its PGS (order 1), closure errors removed in a step"),
+    Row("pinocchio", "compliant", "impulses of its ADMM (order 1), compliance of step² / mean mass"),
     Row("pinocchio", "tuned", "DOP853 (order 8) with projection, tolerance"),
     Row("exudyn", "alpha", "generalised alpha (order 2)"),
     Row("exudyn", "tuned", "trapezoidal rule, extrapolated"),
@@ -114,8 +117,15 @@ def ladder(row: Row, mechanism: Difficulty) -> list[Case]:
     else:
         interval = float(times[1])
         first = max(0, math.ceil(math.log2(interval / float(options["step"]))))
-        found = [{**options, "step": interval / 2.0**k} for k in range(first, first + HALVINGS)]
+        steps = [interval / 2.0**k for k in range(first, first + HALVINGS)]
+        found = [{**options, "step": h, **_shrunk(options, h)} for h in steps]
     return [case._replace(setting=Setting(row.family, o)) for case in offered[:1] for o in found]
+
+
+def _shrunk(options: Mapping[str, float], step: float) -> dict[str, float]:
+    """Return the options that vanish with the step, at a step (s)."""
+    part = step / options["step"]
+    return {name: options[name] * part**power for name, power in VANISHING.items() if name in options}
 
 
 def climb(
