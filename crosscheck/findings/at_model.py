@@ -25,6 +25,7 @@ from crosscheck.judge.momentum import momentum_drifts
 from crosscheck.judge.start_accelerations import Starts, starts
 from crosscheck.processes.pool import run_isolated
 from crosscheck.study.words.speed import TITLES
+from mbref import counts
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
 
@@ -69,6 +70,8 @@ def _meets(scene: Scene, one: Finding, when: When) -> bool:
     types = {joint.type for joint in scene.joint}
     if len(spanning_tree(scene).closures) < when.loops or (when.joints and not types & set(when.joints)):
         return False
+    if when.redundant and counts(scene).redundant < when.redundant:
+        return False
     if when.polynomial and all(coupling.powers == 1 for coupling in scene.coupling):
         return False
     if any(math.hypot(*body.position) < when.away for body in scene.body):
@@ -91,12 +94,11 @@ def _tried(scene: Scene, one: Finding, when: When, settings: Sequence[Setting]) 
 
 
 def _ends(when: When, settings: Sequence[Setting]) -> Iterator[Setting]:
-    """Yield the coarsest and the finest setting of each family that a finding is about."""
+    """Yield the coarsest and the finest setting of each family that a finding is about, or the finest one."""
     asked = when.settings.items()
     for family in when.families:
         found = [s for s in settings if s.family == family and asked <= s.options.items()]
-        yield from found[:1]
-        yield from found[1:][-1:]
+        yield from found[-1:] if when.finest else [*found[:1], *found[1:][-1:]]
 
 
 def _pair(scene: Scene, one: Finding, when: When, setting: Setting) -> Tried | None:

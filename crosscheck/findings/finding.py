@@ -62,12 +62,13 @@ class When:
     """Conditions under which a model can have a finding, and a remedy by which short runs try it.
 
     Conditions are ``versions`` of the engine (empty: any), ``families`` of settings, a least number of
-    independent ``loops``, one of the types of ``joints`` (empty: any), a ``polynomial`` coupling, and bodies
-    that are all ``away`` from the origin (m). The remedy is another ``family`` (empty: the same one) and
-    ``options``. The model has the finding if the remedy changes accelerations at the start by more than
-    ``above``, relative to the largest, and halves their error; without a remedy in the engine, if their error
-    exceeds ``above``. Poses over ``seconds`` count if the engine gives no accelerations.
-    ``settings`` are options that a setting must have.
+    independent ``loops`` and of ``redundant`` rows, one of the types of ``joints`` (empty: any), a
+    ``polynomial`` coupling, and bodies that are all ``away`` from the origin (m). The remedy is another
+    ``family`` (empty: the same one) and ``options``. The model has the finding if the remedy changes
+    accelerations at the start by more than ``above``, relative to the largest, and halves their error;
+    without a remedy in the engine, if their error exceeds ``above``. Poses over ``seconds`` count if the
+    engine gives no accelerations. ``settings`` are options that a setting must have. If ``finest`` is set,
+    only the finest setting of a family is tried, for errors that a finer step does not lower.
     If the run ``keeps`` a quantity of KEPT in truth, its drift over ``seconds`` counts instead. ``says`` is
     the predicate of the sentence for the user, and ``advice`` the remedy.
     """
@@ -78,6 +79,8 @@ class When:
     above: float
     versions: Sequence[str] = ()
     loops: int = 0
+    redundant: int = 0
+    finest: bool = False
     joints: Sequence[str] = ()
     polynomial: bool = False
     away: float = 0.0

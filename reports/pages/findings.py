@@ -51,10 +51,12 @@ def _tried(found: Finding, when: When) -> str:
     """Return the sentence on mechanisms on which `crosscheck diagnose` tries a finding."""
     parts = [f"version {' or '.join(when.versions)}"] if when.versions else []
     parts += [f"mechanisms of at least {when.loops} loop{'s' * (when.loops > 1)}"] if when.loops else []
+    parts += ["redundant rows"] if when.redundant else []
     parts += [f"a joint of the type {', '.join(when.joints)}"] if when.joints else []
     parts += ["a coupling by a polynomial"] if when.polynomial else []
     parts += [f"bodies at least {when.away:g} m from the origin"] if when.away else []
     parts += [f"{name} {value}" for name, value in when.settings.items()]
+    parts += ["the finest step"] if when.finest else []
     parts += [f"motions that keep the {when.keeps}"] if when.keeps else []
     command = f"`crosscheck diagnose SCENE --engine {found.engine}`"
     return f"{command} tries it on your mechanism ({', '.join(parts)}). Remedy: {when.advice}."

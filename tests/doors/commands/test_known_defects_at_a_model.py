@@ -16,6 +16,7 @@ from crosscheck.findings.at_model import defects
 from crosscheck.findings.finding import Finding, When, findings
 from crosscheck.invariants.experiments import four_bar
 from mbref.scene import Scene
+from mbref.scenes import SCENES
 from tests.helpers.falling_engine import STONE
 from tests.helpers.parts import hinge, joint
 
@@ -150,6 +151,12 @@ LARGE = """<mujoco model="large">
 # a mechanism that meets the conditions of a finding and has it, and one that meets them without having it
 MODELS: dict[str, tuple[Scene | Path | str, Scene | str]] = {
     "dart-hinge-closure-turned": (of_findings("hinged_four_bar_turned"), of_findings("ball_four_bar")),
+    "dart-hinge-closure-bennett": (of_findings("bennett"), of_findings("ball_four_bar")),
+    "mjx-connect-without-velocity-term": (four_bar(), SCENES["heavy_top"]()),
+    "mjx-rk4-second-order-on-balls": (SCENES["heavy_top"](), four_bar()),
+    "newton-featherstone-loop-joint": (of_findings("short_four_bar"), SCENES["heavy_top"]()),
+    "newton-semi-implicit-soft-joints": (of_findings("short_four_bar"), SCENES["heavy_top"]()),
+    "newton-xpbd-finer-steps": (of_findings("short_four_bar"), SCENES["heavy_top"]()),
     "mujoco-sparse-jacobian-of-loops": (CHAINS, four_bar()),
     "mujoco-connect-angular-momentum": (PAIR.format(spin=20, other=5), PAIR.format(spin=0, other=-5)),
     "mujoco-implicit-feeds-energy": (CRANK.format(integrator="implicit"), CRANK.format(integrator="RK4")),

@@ -100,7 +100,7 @@ def test_kamino_s_integrators_converge_with_their_order(family, order):
 @INSTALLED
 @pytest.mark.slow
 def test_featherstone_does_not_close_the_loop():
-    """The solver works on trees: without the closing joint the four-bar is off by over 0.1 of its length."""
+    """Without the joint that closes its loop the four-bar is off by over 0.1 of its length."""
     assert error_of_four_bar("featherstone") > 0.1
 
 
@@ -162,8 +162,7 @@ def chain() -> Scene:
     [("lox", pushed), ("semi-implicit", pushed), ("padmm, moreau", chain), ("mujoco", chain)],
 )
 def test_first_step_of_newton_has_the_reference_s_accelerations(family, make):
-    """The change of velocities in a step of 1 ms, over 1 ms, is within 2 % of the reference's largest
-    acceleration. A load of opposite sign, in another frame or unit would change it by more."""
+    """The change of velocities over 1 ms is within 2 % of the reference's largest acceleration."""
     scene, h = make(), 1e-3
     run = engine("newton").run(scene, np.array([0.0, h]), setting(family, h))
     exact = natural_motion(scene, [0.0], EXTENDED)
@@ -176,9 +175,8 @@ def test_first_step_of_newton_has_the_reference_s_accelerations(family, make):
 @pytest.mark.slow
 @pytest.mark.parametrize(("integrator", "part"), [("euler", 0.0), ("moreau", 0.5)])
 def test_first_step_of_kamino_leaves_out_turns_of_its_joints_and_later_steps_have_them(integrator, part):
-    """A rod spins about its end with ω. Kamino closes joints for velocities: by Euler at the pose before the
-    step, so that velocities are those of a step earlier, by Moreau at the pose half a step later. The first
-    step has none, or half, of the acceleration ω² r, and later ones have it, with 1 % for alpha."""
+    """A rod spins about its end with ω. Kamino closes joints for velocities at the pose before the step, by
+    Moreau half a step later: a first step has none, or half, of ω² r, later ones have it; 1 % for alpha."""
     rod = Body(
         name="rod", mass=1.0, inertia=(0.1, 0.1, 0.1), position=(0.5, 0, 0), angular_velocity=(0, 0, 2)
     )
