@@ -61,6 +61,9 @@ def _compare(arguments: argparse.Namespace) -> int:
 
 def _bisect(arguments: argparse.Namespace) -> int:
     package, *scenes = arguments.what
+    if "==" in package:
+        alone = package.partition("==")[0]
+        raise RequestError(f"--bisect: takes a package without a version, such as {alone}, got {package!r}")
     task, (first, last) = _task(arguments, {package}, scenes), _ends(arguments.bisect)
     known = _between_ends(package, released(package), first, last)
     most = 2 + math.ceil(math.log2(len(known)))  # the ends, and one for each halving

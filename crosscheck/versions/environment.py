@@ -54,11 +54,14 @@ def requirement(text: str) -> Requirement:
 
 
 def environment(wanted: Requirement) -> Path:
-    """Return the Python interpreter of the environment of a version, which is made if it is missing.
+    """Return the Python interpreter of the environment of a version.
 
-    Raises NotInstalled.
+    The environment is made if it is missing, and made anew if its interpreter is, as after an upgrade of
+    Python. Raises NotInstalled.
     """
     place, pins = _place(wanted), _pins()
+    if place.is_dir() and not _python(place).exists():
+        shutil.rmtree(place)
     if not place.exists():
         place.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=place.parent, prefix="making-") as made:

@@ -149,6 +149,9 @@ def test_versions_lists_a_changed_acceleration_default_and_name_of_a_function(fo
     assert kinds["accelerations"]["change"].endswith("error 0 → 0.5")
     assert kinds["API"]["place"] == "falling_engine.fall"
     assert kinds["default"]["change"] == "0.1 → 0.2"
+    for python in (four_versions / "cache").rglob("bin/python"):
+        python.unlink()  # the environments have lost their interpreter, as after an upgrade of Python
+    assert versions(four_versions, f"{PACKAGE}==1.0", f"{PACKAGE}==1.3", stone)[0] == 1
 
 
 @pytest.mark.slow
@@ -176,6 +179,10 @@ def test_version_that_does_not_exist_is_refused_with_the_known_versions(four_ver
         (["numpy==2.0", "numpy==2.1"], "numpy: not the package of one engine; add --engine E"),
         (["mujoco==3.0.0", "pin==3.0"], "mujoco and pin: not the package of one engine"),
         (["mujoco", "--bisect", "4.0.0"], "--bisect: must be OLD..NEW, such as 3.13.0..4.0.0, got '4.0.0'"),
+        (
+            ["mujoco==3.0.0", "--bisect", "3.0..4.0"],
+            "--bisect: takes a package without a version, such as mujoco",
+        ),
         (["a==1", "a==2", "--engine", "mujco"], "did you mean 'mujoco'?"),
     ],
 )
