@@ -107,9 +107,11 @@ def measure(
     for first, name in itertools.product(range(0, graphs, BATCH), versions):
         batch = range(first, min(first + BATCH, graphs))
         if missing := [number for number in batch if f"{name} {number}" not in known]:
-            for number in missing:
-                known[f"{name} {number}"] = _record(name, number, known.values())
-            rewrite(path, known.values())
+            try:
+                for number in missing:
+                    known[f"{name} {number}"] = _record(name, number, known.values())
+            finally:  # also of a batch that is interrupted
+                rewrite(path, known.values())
             report(f"{name}: mechanisms {batch[0]} to {batch[-1]} of {graphs}")
     end_idle()
 

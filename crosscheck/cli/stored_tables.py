@@ -65,6 +65,8 @@ def measured(arguments: argparse.Namespace, page: str, measure: Callable[[list[s
     _check_engine(arguments)
     path = Path(arguments.records)
     if arguments.run:
+        if not path.parent.is_dir():
+            raise request.RequestError(f"--records: there is no folder {path.parent}")
         measure(request.find_engines(arguments.engine or ["all"], notice), path)
     return write_page(page, path, arguments.page)
 

@@ -49,6 +49,12 @@ def test_command_names_pairs_above_their_limit_whose_cause_is_not_listed(tmp_pat
     assert "right – also right" not in shown
 
 
+def test_folder_of_records_is_asked_for_before_engines_run(tmp_path, capsys):
+    """Runs take minutes, so that a missing folder is named first."""
+    asked = ["--run", "--engine", "mbref", "--records", str(tmp_path / "missing" / "records.jsonl")]
+    assert main(["alternatives", *asked]) == 2 and "there is no folder" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("number", "fewest", "most"), [(0, 5, 60), (3, 5, 60), pytest.param(9, 61, 200, marks=pytest.mark.slow)]
 )
