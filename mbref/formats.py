@@ -72,7 +72,8 @@ def add_options(parser: Any) -> None:
         default="",
         help="kinds of parts that may be left out although they change the motion, separated by commas:\n"
         "armature, couplings, damping, flexible-bodies, fluid, friction, gravity-compensation,\n"
-        "kinematic-links, limits, motors, sleep, springs, or everything; what a scene can describe stays",
+        "kinematic-links, limits, motors, sleep, springs, start, or everything;\n"
+        "what a scene can describe stays",
     )
     parser.add_argument(
         "--keyframe",

@@ -57,19 +57,21 @@ class Own(Loader):
         ending = {MJCF: ".xml", URDF: ".urdf", SDF: ".sdf"}[form]
         if path.suffix != ending:
             raise ValueError(f"the importers read this format from files that end in {ending}")
-        options = formats.ImportOptions(without=EVERYTHING)
+        options, rotors = formats.ImportOptions(without=EVERYTHING), dict[str, float]()
         if form == MJCF:
-            found = source(path, options, is_passive=True).imported
+            own = source(path, options, is_passive=True)
+            found, groups = own.imported, own.groups
+            rotors = {groups.names[g]: armature for g, armature in groups.rotors.items()}
         else:
             found = formats.read(path, options)
-        return Imported(found.scene, (*found.left_out, *found.notes))
+        return Imported(found.scene, (*found.left_out, *found.notes), rotors)
 
 
 class Imported(Loaded):
-    """A scene at its start."""
+    """A scene at its start; ``rotors`` are armatures of ball joints, by the body whose inertia has them."""
 
-    def __init__(self, scene: Scene, messages: tuple[str, ...]):
-        self.scene, self.messages = scene, messages
+    def __init__(self, scene: Scene, messages: tuple[str, ...], rotors: Mapping[str, float]):
+        self.scene, self.messages, self.rotors = scene, messages, rotors
 
     def machine(self) -> Machine:
         tree, loops = self._tree()
@@ -92,7 +94,8 @@ class Imported(Loaded):
         body = self.scene.body[k]
         inertia = np.asarray(body.inertia if body.inertia is not None else np.zeros(3), float)
         moments = np.diag(inertia) if inertia.ndim == 1 else inertia
-        return self._place(k).body(body.name, body.mass or 0.0, [0, 0, 0], moments)
+        own = moments - self.rotors.get(body.name, 0.0) * np.eye(3)
+        return self._place(k).body(body.name, body.mass or 0.0, [0, 0, 0], own)
 
     def _tree(self) -> tuple[list[Joint], list[Loop]]:
         """Return the joints that connect new bodies, in the scene's order, and the others as loops."""
@@ -183,13 +186,17 @@ class Imported(Loaded):
         found: dict[str, Any] = {
             "damping": coefficients(sum(each.damping for each in (*springs, *dampers))),
             "stiffness": stiffness,
-            "armature": joint.reflected_inertia,
+            "armature": self._armature(joint),
             "friction": 0.0,
             **limits(-math.inf, math.inf),
         }
         if stiffness and len(springs) == 1:
             found["rest"] = _rest(springs[0])
         return found
+
+    def _armature(self, joint: AnyJoint) -> float:
+        is_ball = joint.type == "spherical" and joint.bodies[0] == GROUND
+        return self.rotors.get(joint.bodies[1], 0.0) if is_ball else joint.reflected_inertia
 
     def _couplings(self) -> Iterator[Coupling]:
         for coupling in self.scene.coupling:

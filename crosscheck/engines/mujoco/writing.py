@@ -78,7 +78,7 @@ def write(scene: Scene) -> Exported:
         new |= given
         other += [f"{kind} name {wanted[k]!r}: is {given[k]!r}" for k in wanted if given[k] != wanted[k]]
     motors = [(new[name], amount) for name, amount, _ in pushed]
-    return Exported(_text(spec, new, motors), (*other, *_left_out(scene, damping)))
+    return Exported(_text(spec, new, motors), (*other, *_left_out(scene, damping), *_divided(bare, tree)))
 
 
 def _distinct(names: dict[str, str], taken: Iterable[str]) -> dict[str, str]:
@@ -212,6 +212,23 @@ def _true_inertia(body: Any, link: Link) -> None:
     moments[2] = max(moments[1], min(moments[2], (moments[0] + moments[1]) * (1 - 1e-15)))
     body.mass, body.inertia = link.mass, moments
     body.ipos, body.iquat = link.offset, rotations.from_matrix(axes)
+
+
+def _divided(scene: Scene, tree: Tree) -> Iterator[str]:
+    """Yield sentences on bodies whose mass the file divides; the motion is the scene's."""
+    for closure in tree.closures:
+        if closure.kind == "weld":
+            name = scene.body[tree.links[closure.links[0]].body].name
+            joint = scene.joint[closure.joint].name
+            yield f"joint {joint}: its body {name} is in parts that welds hold, each with a share of its mass"
+    for rod in (link for link in tree.links if link.ends):
+        ends = [anchor.tolist() for _, anchor in rod.ends]
+        joint = next(
+            j.name for j in scene.joint if j.type == "distance" and list(map(list, j.anchors)) == ends
+        )
+        names = " and ".join(scene.body[b].name for b, _ in rod.ends if b >= 0)
+        rod_of = f"a rod of {rod.mass:.3g} kg between ball joints"
+        yield f"distance joint {joint}: is {rod_of}, with mass of {names}"
 
 
 def _left_out(scene: Scene, damping: Sequence[Load]) -> Iterator[str]:

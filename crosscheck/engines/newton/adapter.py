@@ -27,7 +27,7 @@ OPTIONS = STEP | {
     "alpha": "fraction of a joint error that a step of Kamino removes",
     "solver": "of Kamino: padmm, dvi or lox",
     "integrator": "of Kamino: euler or moreau",
-    "sparse": "whether Kamino's Jacobian is sparse; by default that of DVI and LOX",
+    "sparse": "whether Kamino's Jacobian is sparse; by default sparse with DVI and LOX",
     "penalty": "penalty of PADMM; 1 by default",
     "tolerance": "joint error, m or rad, at which LOX ends",
     "iterations": "largest number of iterations of PADMM or LOX",

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.mujoco.importing.left_out import Part
 from crosscheck.engines.sdf.frames import Frames, Pose, numbers
 from crosscheck.engines.shared import xml_files
 from mbref.formats import numbered
@@ -20,24 +21,25 @@ KNOWN = {  # outer elements → inner elements that are read, listed otherwise, 
     "world": (
         *("name", "gravity", "include", "model", "frame", "joint", "actor", "light", "plugin", "audio"),
         *("physics", "scene", "gui", "spherical_coordinates", "magnetic_field", "atmosphere", "road"),
+        *("wind", "state"),
     ),
     "model": (
         *("static", "self_collide", "allow_auto_disable", "include", "model", "frame", "pose", "link"),
-        *("joint", "plugin", "gripper", "sensor"),
+        *("joint", "plugin", "gripper", "sensor", "enable_wind"),
     ),
     "link": (
         *("gravity", "kinematic", "self_collide", "must_be_base_link", "velocity_decay"),
         *("pose", "inertial", "collision"),
         *("visual", "sensor", "projector", "audio_sink", "audio_source", "battery", "light", "plugin"),
-        "particle_emitter",
+        *("particle_emitter", "enable_wind"),
     ),
     "inertial": ("mass", "pose", "inertia", "fluid_added_mass", "density", "auto_inertia_params"),
     "joint": (
         *("parent", "child", "pose", "axis", "axis2", "gearbox_ratio", "gearbox_reference_body"),
         *("thread_pitch", "screw_thread_pitch", "sensor"),
     ),
-    "axis": ("xyz", "dynamics", "limit", "mimic"),
-    "axis2": ("xyz", "dynamics", "limit", "mimic"),
+    "axis": ("xyz", "dynamics", "limit", "mimic", "initial_position"),
+    "axis2": ("xyz", "dynamics", "limit", "mimic", "initial_position"),
     "mimic": ("multiplier", "offset", "reference"),
     "dynamics": ("damping", "friction", "spring_reference", "spring_stiffness"),
 }
@@ -63,6 +65,31 @@ def unused(root: ET.Element) -> Iterator[str]:
     for count in (*counts, (limits, "limit of a joint", "limits of joints")):
         if count[0]:
             yield numbered(*count)
+
+
+def of_world(root: ET.Element) -> Iterator[Part]:
+    """Return the state and the wind of a world, which change the motion of its models."""
+    for state in root.findall("world/state"):
+        yield Part("start", f"state of world {state.get('world_name', '')!r}")
+    wind = root.find("world/wind/linear_velocity")
+    if wind is not None and np.any(numbers(wind, "wind", 3)):
+        for model in root.findall("world/model"):
+            yield from (Part("fluid", f"wind at link {name!r}") for name in _blown(model))
+
+
+def _blown(model: ET.Element, outer: ET.Element | None = None) -> Iterator[str]:
+    """Return the names of the links of a model that wind blows on; a link or model without its own element
+    has the one of the model around it."""
+    if is_true(model.find("static")):
+        return
+    whole = model.find("enable_wind")
+    whole = outer if whole is None else whole
+    for link in model.findall("link"):
+        own = link.find("enable_wind")
+        if is_true(whole if own is None else own):
+            yield str(link.get("name"))
+    for inner in model.findall("model"):
+        yield from _blown(inner, whole)
 
 
 def pitch(joint: ET.Element) -> float:

@@ -18,6 +18,7 @@ from crosscheck.engines.sdf.elements import (
     is_true,
     limits_of,
     number,
+    of_world,
     pitch,
     plain,
     unused,
@@ -82,6 +83,7 @@ def read(path: Path, options: ImportOptions) -> Imported:
             [f"{path}: has {', '.join(others)} beside world {world.get('name')!r}; keep one of them"]
         )
     root = expanded(root, path)
+    reader.parts += of_world(root)
     reader.read(flattened(root))
     if not reader.bodies:
         raise SceneError([f"{path}: has no body that moves"])
@@ -213,6 +215,8 @@ class _Reader:
                 self._dynamics(axis, made)
                 self._mimic(axis, made)
                 self._limit(axis, made, tag)
+                if number(axis.find("initial_position"), f"joint {name!r}: initial_position", 0.0):
+                    self.parts.append(Part("start", f"initial position of joint {name!r}"))
 
     def _body_at(self, joint: ET.Element, end: str, frames: Frames) -> str:
         """Return the body of a link or frame that a joint names."""

@@ -7,12 +7,8 @@ import pytest
 
 from crosscheck.closed_loops.mechanisms import FOLDER
 from crosscheck.engine import Owner, Setting, engine
-from crosscheck.engines.newton.adapter import JOINTS
-from crosscheck.engines.newton.model import Mechanism
 from crosscheck.engines.newton.solvers import ALPHAS, FAMILIES
-from crosscheck.engines.shared.spanning_tree import spanning_tree
 from crosscheck.judge.arithmetic import EXTENDED, doubles
-from crosscheck.judge.constraints import initial_twists
 from crosscheck.judge.metrics import error_series
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.truth import truth_for
@@ -36,7 +32,6 @@ ERRORS = {
     "semi-implicit": 7.8e-3,
 }
 CLOSE = 1.5  # times the measured errors, which are errors of the method and not of rounding
-SINGLE = 1e-6  # some roundings of Newton's single precision, 6e-8
 
 
 def setting(family: str, step: float = STEP) -> Setting:
@@ -90,28 +85,6 @@ def test_kamino_s_integrators_converge_with_their_order(family, order):
     lengths = np.array([4e-3, 2e-3, 1e-3])  # s
     slope, _ = np.polyfit(np.log(lengths), np.log([error_of_four_bar(family, h) for h in lengths]), 1)
     assert slope == pytest.approx(order, abs=0.3)
-
-
-@INSTALLED
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["spatial_slider_crank_gravity", "bennett", "flyball_governor"])
-def test_newton_s_kinematics_give_the_poses_and_velocities_at_the_start(name):
-    """Newton's forward kinematics gives the poses of the adapter's bodies, and its joint rates the judge's
-    velocities. Limits are roundings: 1e-6 m, and 1e-5 of 1 + the largest velocity."""
-    scene = SCENES[name]()
-    mechanism = Mechanism(scene, spanning_tree(scene, JOINTS))
-    state = mechanism.model.state()
-    state.joint_qd.assign(mechanism.state.joint_qd)
-    mechanism.newton.eval_fk(mechanism.model, mechanism.model.joint_q, state.joint_qd, state)
-    given, found = mechanism.state.body_qd.numpy(), state.body_qd.numpy()
-    assert np.abs(found - given).max() < 10 * SINGLE * (1 + np.abs(given).max())
-    model, computed = mechanism.model.body_q.numpy(), state.body_q.numpy()
-    assert np.abs(model[:, :3] - computed[:, :3]).max() < SINGLE
-    assert np.abs(np.abs((model[:, 3:] * computed[:, 3:]).sum(axis=1)) - 1).max() < SINGLE  # quaternions
-    linear, angular = initial_twists(scene)
-    own = list(mechanism.tree.own)
-    assert np.abs(mechanism.motion().velocity[own] - linear).max() < 10 * SINGLE * (1 + np.abs(linear).max())
-    assert np.abs(given[own, 3:] - angular).max() < 10 * SINGLE * (1 + np.abs(angular).max())
 
 
 def pushed() -> Scene:

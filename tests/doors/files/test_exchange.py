@@ -15,7 +15,7 @@ from mbref import formats, rotations, simulate
 from mbref.cli import main
 from mbref.formats import ImportOptions
 from mbref.motions.trajectory import Trajectory
-from mbref.scene import Body, Revolute, Scene, SceneError, Spring, Universal
+from mbref.scene import Body, Distance, Revolute, Scene, SceneError, Spring, Universal
 from mbref.scenes import find_scene
 from tests.helpers.measured import MARGIN
 
@@ -98,6 +98,7 @@ def test_piston_of_a_cut_slide_is_read_in_two_parts_with_its_mass_after_a_round_
     formats.write(scene, tmp_path / "again.xml")
     again = formats.read(tmp_path / "again.xml")
     assert "fixed to 'pin' and part of it: 'piston'" in again.notes
+    assert FORMAT.write(scene).left_out[-1].startswith("joint D: its body piston is in parts")
     mass, found = ({body.name: body.mass for body in each.body} for each in (scene, again.scene))
     assert found.keys() == {"crank", "rod", "pin", "piston (share 4)"}
     both = mass["pin"] + mass["piston"]
@@ -162,6 +163,14 @@ def test_export_reports_moments_and_drivers_that_it_leaves_out():
     left_out = FORMAT.write(find_scene("planar_slider_crank")).left_out
     assert left_out[0] == "load[0] (moment on crank): apply it by mjData.xfrc_applied"
     assert FORMAT.write(find_scene("four_bar")).left_out[0].startswith("driver of A: ")
+
+
+def test_export_reports_the_mass_of_the_rod_for_a_distance_joint():
+    """The rod's mass is a tenth of the least effective mass of a body at its anchors, from each body."""
+    ends = Distance(name="D", bodies=("ground", "b"), anchors=[(0, 0, 1), (0, 0, 0)])
+    body = Body(name="b", mass=1, inertia=(1, 1, 1), position=(0, 0, 0))
+    [_, said] = FORMAT.write(Scene(name="rod", body=[body], joint=[ends])).left_out
+    assert said == "distance joint D: is a rod of 0.2 kg between ball joints, with mass of b"
 
 
 def changed(tmp_path, old: str, new: str) -> Path:

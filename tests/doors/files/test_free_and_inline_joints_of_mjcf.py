@@ -69,12 +69,15 @@ DAMPED = """<mujoco><option gravity="0 0 0"/><worldbody><body name="base"><joint
 <inertial mass="2" pos="CENTRE" diaginertia=".3 .4 .5"/><body name="arm" pos=".3 0 0"><inertial mass="1"
 pos=".2 0 .1" diaginertia=".3 .4 .5"/><joint type="ball" damping=".07"/></body></body></worldbody><keyframe>
 <key name="k" qpos=".1 .2 .3 .5 .5 -.5 .5 .8 0 .6 0" qvel="1 2 -1 3 -2 1 2 1 -3"/></keyframe></mujoco>"""
+BALL = DAMPED.replace("free", "ball").replace(".1 .2 .3 .5", ".5").replace("1 2 -1 3", "3")
 
 
-def test_damped_free_and_ball_joints_accelerate_as_in_mujoco_and_are_written_again(tmp_path):
-    """A free joint damps its body's rotation and origin. MJCF is written if this is the centre of mass."""
+@pytest.mark.parametrize("text", [DAMPED, BALL.replace(".4", ".4' armature='.6".replace("'", '"'), 1)])
+def test_damped_free_and_ball_joints_accelerate_as_in_mujoco_and_are_written_again(text, tmp_path):
+    """A free joint damps its body's rotation and origin. MJCF is written if this is the centre of mass.
+    MuJoCo adds the armature of a ball joint, 0.6 kg m², to the diagonal of its mass matrix."""
     path, theirs = tmp_path / "a.xml", np.zeros(6)
-    path.write_text(DAMPED.replace("CENTRE", ".1 -.2 .3"))
+    path.write_text(text.replace("CENTRE", ".1 -.2 .3"))
     found = source(path, ImportOptions(keyframe="k"))
     model, data = found.original, mujoco.MjData(found.original)
     data.qpos[:], data.qvel[:] = found.qpos, found.qvel
@@ -84,7 +87,7 @@ def test_damped_free_and_ball_joints_accelerate_as_in_mujoco_and_are_written_aga
         mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_BODY, model.body(name).id, theirs, 0)
         own = np.hstack([mine[name].angular_acceleration[0], mine[name].acceleration[0]])
         assert np.allclose(own, theirs, rtol=0, atol=1e-10)
-    path.write_text(DAMPED.replace("CENTRE", "0 0 0"))
+    path.write_text(text.replace("CENTRE", "0 0 0"))
     scene = FORMAT.read(path, ImportOptions()).scene
     path.write_text(FORMAT.write(scene).text)
     assert FORMAT.read(path, ImportOptions()).scene.load == scene.load

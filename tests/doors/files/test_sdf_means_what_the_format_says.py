@@ -233,14 +233,34 @@ def test_gravity_of_the_physics_counts_before_sdf_1_6_in_the_import_and_in_every
         ("</link>", "<gravity>0</gravity></link>", "gravity-compensation", "link 'b' without weight"),
         ("</link>", "<velocity_decay/></link>", "damping", "velocity_decay of link 'b'"),
         ("</link>", "<kinematic>1</kinematic></link>", "kinematic-links", "kinematic link 'b'"),
+        (
+            "</axis>",
+            "<initial_position>1</initial_position></axis>",
+            "start",
+            "initial position of joint 'j'",
+        ),
     ],
 )
 def test_link_element_that_changes_the_motion_is_refused_or_left_out(files, old, new, kind, sentence):
     """The error and the list of what is left out name the element, the link and the option ``--without``."""
-    text = sdf(link("b").replace(old, new))
+    text = sdf(link("b"), joint("j", "revolute", "world", "b")).replace(old, new)
     says = f"{sentence}: it changes the motion; --without {kind} leaves it out"
     assert says in files.refusal(text, "b.sdf")
     assert f"left out: {sentence} (--without {kind})" in files.scene(text, "b.sdf", "--without", kind)[1]
+
+
+STATE = '<state world_name="w"/>'
+
+
+@pytest.mark.parametrize("blown", [0, 1])
+def test_state_and_wind_of_a_world_are_refused_if_they_change_the_motion(files, blown):
+    """Wind blows on links with ``enable_wind``; the state has poses and velocities of the models."""
+    parts = f"<wind><linear_velocity>0 3 0</linear_velocity></wind>{STATE * blown}"
+    model = f"<model name='m'><enable_wind>{blown}</enable_wind>{link('b')}</model>"
+    text = f"<sdf version='1.9'><world name='w'>{parts}{model}</world></sdf>"
+    said = files.scene(text, "w.sdf", *("--without", "fluid,start")[: 2 * blown])[1]
+    assert ("state of world 'w'" in said, "wind at link 'b'" in said) == (blown, blown)
+    assert not blown or "wind at link 'b'" in files.refusal(text, "w.sdf", "--without", "start")
 
 
 SPRUNG = (

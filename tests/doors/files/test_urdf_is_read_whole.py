@@ -124,9 +124,9 @@ def test_prefix_without_a_declaration_is_read_as_by_parsers_without_namespaces(f
     assert scene == files.scene(plain, "r.urdf")[0]
 
 
-def test_limits_without_a_range_are_named(files):
+@pytest.mark.parametrize("limits", ["", '<limit effort="1" velocity="1"/>'])
+def test_limits_without_a_range_are_named(files, limits):
     """The format's default of both ends is 0, which would lock the joint; engines read it as no limit."""
-    limits = '<limit effort="1" velocity="1"/>'
     free = hinge("ja", "base", "a", "0 0 0", more=limits).replace("continuous", "revolute")
     _, out = files.scene(robot(free, *CRANKS[1:]), "r.urdf")
     assert "limits of joints 'ja': lower and upper are 0 or missing; the joints are free" in out

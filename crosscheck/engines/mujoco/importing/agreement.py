@@ -25,6 +25,7 @@ AGREE = 1e-8  # largest difference / largest entry; rounding of inertias and pos
 RANK = 1e-8  # fraction of the largest singular value of rows of length one
 BLURRED = 1e3  # factor on RANK within which a singular value may be rounding of the axes in the file
 SHORT = 1e-2  # of rad and of the extent: shorter rows, which may be rounding, are not made length one
+CANCELLED = 1e-4  # of the extent in m: rows shorter than it may be rounding of coordinates as large
 RANDOM_POSES = 2
 TRIES = 12  # random poses tried for each comparison, since not every pose can be closed
 REACH = 0.25  # rad, or fraction of the extent: largest change of a coordinate in a random pose
@@ -145,7 +146,7 @@ class Agreement:
         """Check that rows of loops and of locked coordinates have the row space of the file's rows, in joint
         coordinates."""
         scale = self.poses.scale
-        least = SHORT * min(1.0, self.poses.extent)
+        least = max(SHORT * min(1.0, self.poses.extent), CANCELLED * self.poses.extent)
         ours = _unit(jacobian(scene, 0.0, *pose)[0] @ twists * scale, least)
         theirs = _unit(np.vstack([self._equalities(), self.poses.jacobian()]) * scale, least)
         ranks = _ranks(ours, theirs)

@@ -51,6 +51,7 @@ class Groups:
         self.mass[WORLD] = np.inf
         self.names = {g: self._name(g) for g in self.members}
         self.pieces = [Piece(g) for g in self.massive]  # the bodies of the scene, carrying ones first
+        self.rotors: dict[int, float] = {}  # armatures (kg m²) in the inertias of groups on ball joints
 
     @property
     def massive(self) -> list[int]:
@@ -181,7 +182,7 @@ class Groups:
 
     def _inertia(self, data: Any, group: int, centre: np.ndarray) -> np.ndarray:
         """Return the world inertia (3, 3) about the group's centre of mass, by Steiner's theorem."""
-        total = np.zeros((3, 3))
+        total = self.rotors.get(group, 0.0) * np.eye(3)
         for b in self.members[group]:
             axes, arm = data.ximat[b].reshape(3, 3), data.xipos[b] - centre
             total += axes @ np.diag(self.model.body_inertia[b]) @ axes.T

@@ -24,6 +24,7 @@ KINDS = {  # kinds of parts that change the motion → their description
     "limits": "limits of joints and tendons that act at the start",
     "motors": "actuators that exert a force and that no load of a scene describes",
     "sleep": "bodies that begin asleep, which MuJoCo does not move",
+    "start": "positions and velocities at the start apart from the poses of links",
     "springs": "springs of joints and tendons that no load of a scene describes",
 }
 EVERYTHING = "everything"

@@ -31,7 +31,7 @@ from crosscheck.engines.mujoco.importing.asked_closures import Frames, asked, un
 from crosscheck.engines.mujoco.importing.chains import Chain, branching, kind_of, renamed
 from crosscheck.engines.mujoco.importing.closures import Closure, of_equalities
 from crosscheck.engines.mujoco.importing.compiling import compiled, extent_of, root_link
-from crosscheck.engines.mujoco.importing.groups import Groups
+from crosscheck.engines.mujoco.importing.groups import WORLD, Groups
 from crosscheck.engines.mujoco.importing.left_out import Part
 from crosscheck.engines.mujoco.importing.posing import JointRow, Poses
 from crosscheck.engines.mujoco.warnings_off import without_warnings
@@ -244,7 +244,10 @@ class _Reader:
         self._couple()
 
     def _with_armature(self, chain: Chain, joints: list[Joint]) -> list[Joint]:
-        """Return the joints of a chain; the joint of a single hinge or slide has its armature."""
+        """Return the joints of a chain; the joint of a single hinge or slide has its armature. No inertia of
+        one body describes the armature of a ball joint between two, which turns at ω₂ - ω₁."""
+        if chain.kinds == ("ball",) and chain.ends[0].group == WORLD:
+            return self._on_world(chain, joints)
         has_armature = len(joints) == 1 and "armature" in type(joints[0]).model_fields
         driven = joints[0].facts.driven if has_armature else None
         wanted = {"hinge": ANGLE, "slide": DISPLACEMENT}
@@ -257,6 +260,18 @@ class _Reader:
             return joints
         self.kept.append(dof)
         return [joints[0].model_copy(update={"armature": armature})]
+
+    def _on_world(self, chain: Chain, joints: list[Joint]) -> list[Joint]:
+        """Return the ball joint between the world and a body, whose inertia gets the joint's armature a: its
+        energy is ½ a ω², and its momentum a ω along ω has no gyroscopic moment."""
+        dof, body = int(self.model.jnt_dofadr[chain.joints[0]]), chain.ends[1]
+        if armature := float(self.model.dof_armature[dof]):
+            self.groups.rotors[body.group] = armature
+            self.kept += range(dof, dof + 3)
+            of = left_out.joint_name(self.model, chain.joints[0])
+            what = f"armature {armature:g} kg m² of joint {of}"
+            self.notes.append(f"{what}: is added to each moment of inertia of {self.groups.name(body)!r}")
+        return joints
 
     def _read_merged(self) -> None:
         for members in self.groups.members.values():

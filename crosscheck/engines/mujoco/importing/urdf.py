@@ -201,9 +201,9 @@ def _number(text: str) -> float:
 
 
 def _has_no_range(joint: ET.Element) -> bool:
-    """Return whether a joint has limits whose ends are 0 or missing."""
+    """Return whether a joint has no limits, or limits whose ends are 0 or missing."""
     limit = joint.find("limit")
-    return limit is not None and not any(limit.get(end, "0").strip(" +-.0") for end in ENDS)
+    return limit is None or not any(limit.get(end, "0").strip(" +-.0") for end in ENDS)
 
 
 def loops(root: ET.Element, body_of: BodyOf, data: Any) -> Iterator[Closure]:
